@@ -1,0 +1,27 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace afterglow {
+
+/// A fault of the world (file, option, device), told in one line: what, where, remedy.
+/// Only main() catches it; exit status 1.
+class Error : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+/// A fault of a file; the message starts with its path.
+class FileError : public Error {
+public:
+    FileError(const std::string& path, const std::string& what) : Error(path + ": " + what) {}
+};
+
+/// The command line asks for something impossible; exit status 2.
+class UsageError : public Error {
+public:
+    using Error::Error;
+};
+
+} // namespace afterglow

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace afterglow {
+
+/// Writes a file through `write(temporary_path)` beside its target and renames it over it when that
+/// returns; on any failure nothing is left behind. Throws FileError where the rename or sync fails.
+void write_atomically(const std::string& path,
+                      const std::function<void(const std::string& temporary_path)>& write);
+
+/// A whole file, mapped read-only. Throws FileError.
+class MappedFile {
+public:
+    explicit MappedFile(const std::string& path);
+    ~MappedFile();
+    MappedFile(const MappedFile&) = delete;
+    MappedFile& operator=(const MappedFile&) = delete;
+    std::span<const std::byte> bytes() const { return {data_, size_}; }
+
+private:
+    const std::byte* data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+/// XXH3 of some bytes, 128 bits as 32 hexadecimal digits; `content_hash` and file checksums use it.
+std::string hash_hex(std::span<const std::byte> bytes);
+
+} // namespace afterglow

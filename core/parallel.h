@@ -1,0 +1,56 @@
+#pragma once
+
+#include "core/types.h"
+
+#include <cstddef>
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace afterglow {
+
+/// Limits every parallel loop of the process to `threads` (0: all processors) for as long as the
+/// object lives. Results never depend on the number.
+class ThreadLimit {
+public:
+    explicit ThreadLimit(int threads);
+    ~ThreadLimit();
+    ThreadLimit(const ThreadLimit&) = delete;
+    ThreadLimit& operator=(const ThreadLimit&) = delete;
+
+private:
+    void* control_;
+};
+
+/// Number of threads that parallel loops use now.
+int thread_count();
+
+/// Calls body(begin, end) for consecutive ranges that cover [0, count), each at most `grain` long
+/// and starting at a multiple of it, so that the split never depends on the number of threads.
+/// Denormals are flushed to zero inside. An exception of any body is thrown again here.
+void parallel_ranges(Index count, Index grain, const std::function<void(Index, Index)>& body);
+
+/// Calls body(i) for each i in [0, count); each call owns the slot i of whatever it writes.
+template <class Body>
+void parallel_for(Index count, const Body& body, Index grain = 64) {
+    parallel_ranges(count, grain, [&](Index begin, Index end) {
+        for (Index i = begin; i < end; ++i) body(i);
+    });
+}
+
+/// Sum of term(i) over [0, count), added up in fixed chunks and in order: the same bits at any
+/// number of threads.
+template <class T, class Term>
+T parallel_sum(Index count, T zero, const Term& term, Index grain = 256) {
+    std::vector<T> partial(static_cast<std::size_t>((count + grain - 1) / grain), zero);
+    parallel_ranges(count, grain, [&](Index begin, Index end) {
+        T sum = zero;
+        for (Index i = begin; i < end; ++i) sum += term(i);
+        partial[static_cast<std::size_t>(begin / grain)] = sum;
+    });
+    T total = zero;
+    for (const T& p : partial) total += p;
+    return total;
+}
+
+} // namespace afterglow

@@ -1,0 +1,184 @@
+#include "core/surface.h"
+
+#include "core/error.h"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace afterglow {
+
+struct Surface::Tree {
+    RTCDevice device = nullptr;
+    RTCScene scene = nullptr;
+    ~Tree() {
+        if (scene) rtcReleaseScene(scene);
+        if (device) rtcReleaseDevice(device);
+    }
+};
+
+namespace {
+
+RTCRay to_embree(const Ray& ray) {
+    RTCRay r{};
+    r.org_x = ray.origin.x(), r.org_y = ray.origin.y(), r.org_z = ray.origin.z();
+    r.dir_x = ray.direction.x(), r.dir_y = ray.direction.y(), r.dir_z = ray.direction.z();
+    r.tnear = 0.0f;
+    r.tfar = ray.length;
+    r.mask = ~0u;
+    return r;
+}
+
+} // namespace
+
+Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tree>()) {
+    const Eigen::AlignedBox3f box = scene.bounds();
+    const float largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+    lift_ = std::max(largest * 0x1p-19f, std::numeric_limits<float>::min());
+
+    tree_->device = rtcNewDevice(nullptr);
+    if (!tree_->device) throw Error("Embree cannot start on this machine");
+    tree_->scene = rtcNewScene(tree_->device);
+    rtcSetSceneFlags(tree_->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(tree_->scene, RTC_BUILD_QUALITY_HIGH);
+
+    RTCGeometry mesh = rtcNewGeometry(tree_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(
+        rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                3 * sizeof(float), std::max<std::size_t>(1, scene.positions.size())));
+    auto* indices = static_cast<std::uint32_t*>(
+        rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(std::uint32_t), std::max<std::size_t>(1, scene.triangles.size())));
+    if (!vertices || !indices) {
+        rtcReleaseGeometry(mesh);
+        throw Error("Embree has not enough memory for " + std::to_string(scene.triangles.size())
+                    + " triangles");
+    }
+    for (std::size_t i = 0; i < scene.positions.size(); ++i)
+        std::copy_n(scene.positions[i].data(), 3, vertices + 3 * i);
+    for (std::size_t i = 0; i < scene.triangles.size(); ++i)
+        std::copy_n(scene.triangles[i].data(), 3, indices + 3 * i);
+    rtcCommitGeometry(mesh);
+    rtcAttachGeometry(tree_->scene, mesh);
+    rtcReleaseGeometry(mesh);
+    rtcCommitScene(tree_->scene);
+    if (const RTCError error = rtcGetDeviceError(tree_->device); error != RTC_ERROR_NONE)
+        throw Error("Embree cannot build its tree over " + std::to_string(scene.triangles.size())
+                    + " triangles (error " + std::to_string(error) + ")");
+}
+
+Surface::~Surface() = default;
+
+Hit Surface::closest_hit(const Ray& ray) const {
+    RTCRayHit query{};
+    query.ray = to_embree(ray);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(tree_->scene, &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+    const float facing = query.hit.Ng_x * ray.direction.x() + query.hit.Ng_y * ray.direction.y()
+                         + query.hit.Ng_z * ray.direction.z();
+    return {query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v, facing > 0.0f};
+}
+
+void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const {
+    constexpr std::size_t width = 8;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    alignas(32) int valid[width];
+    alignas(32) RTCRayHit8 packet;
+    for (std::size_t begin = 0; begin < rays.size(); begin += width) {
+        const std::size_t count = std::min(width, rays.size() - begin);
+        for (std::size_t k = 0; k < width; ++k) {
+            valid[k] = k < count ? -1 : 0;
+            const Ray& ray = rays[begin + std::min(k, count - 1)];
+            packet.ray.org_x[k] = ray.origin.x();
+            packet.ray.org_y[k] = ray.origin.y();
+            packet.ray.org_z[k] = ray.origin.z();
+            packet.ray.dir_x[k] = ray.direction.x();
+            packet.ray.dir_y[k] = ray.direction.y();
+            packet.ray.dir_z[k] = ray.direction.z();
+            packet.ray.tnear[k] = 0.0f;
+            packet.ray.tfar[k] = ray.length;
+            packet.ray.time[k] = 0.0f;
+            packet.ray.mask[k] = ~0u;
+            packet.ray.id[k] = 0;
+            packet.ray.flags[k] = 0;
+            packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+        }
+        rtcIntersect8(valid, tree_->scene, &context, &packet);
+        for (std::size_t k = 0; k < count; ++k) {
+            Hit& hit = hits[begin + k];
+            if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {
+                hit = {};
+                continue;
+            }
+            const float facing = packet.hit.Ng_x[k] * packet.ray.dir_x[k]
+                                 + packet.hit.Ng_y[k] * packet.ray.dir_y[k]
+                                 + packet.hit.Ng_z[k] * packet.ray.dir_z[k];
+            hit = {packet.ray.tfar[k], packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k],
+                   facing > 0.0f};
+        }
+    }
+}
+
+bool Surface::occluded(const Ray& ray) const {
+    RTCRay query = to_embree(ray);
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(tree_->scene, &context, &query);
+    return query.tfar < 0.0f;
+}
+
+bool Surface::blocked(const Vec3& from, const Vec3& to) const {
+    const Vec3 step = to - from;
+    const float length = step.norm();
+    if (!(length > 0.0f)) return false;
+    return occluded({from, step / length, length});
+}
+
+Vec3 Surface::geometric_normal(const Hit& hit) const {
+    const Triangle& t = scene_.triangles[hit.primitive];
+    const Vec3& a = scene_.positions[t[0]];
+    const Vec3 n = (scene_.positions[t[1]] - a).cross(scene_.positions[t[2]] - a).stableNormalized();
+    return hit.back_side ? Vec3(-n) : n;
+}
+
+SurfacePoint Surface::point(const Hit& hit) const {
+    const Triangle& t = scene_.triangles[hit.primitive];
+    const float w = 1.0f - hit.u - hit.v;
+    SurfacePoint x;
+    x.position = w * scene_.positions[t[0]] + hit.u * scene_.positions[t[1]]
+                 + hit.v * scene_.positions[t[2]];
+    const Vec3 geometric = geometric_normal(hit);
+    x.normal = geometric;
+    if (!scene_.normal_indices.empty()) {
+        const Triangle& n = scene_.normal_indices[hit.primitive];
+        if (n[0] != no_index) {
+            const Vec3 sum = w * scene_.normals[n[0]] + hit.u * scene_.normals[n[1]]
+                             + hit.v * scene_.normals[n[2]];
+            const float length = sum.norm();
+            // A normal across the surface's own plane says nothing of the side that is seen.
+            if (length > 1e-6f) {
+                const Vec3 shading = (hit.back_side ? -sum : sum) / length;
+                if (shading.dot(geometric) > 0.01f) x.normal = shading;
+            }
+        }
+    }
+    return x;
+}
+
+Rgb Surface::reflectance(const Hit& hit) const {
+    const Material& material = scene_.materials[scene_.material_index[hit.primitive]];
+    if (material.texture == no_index || scene_.texture_indices.empty()) return material.reflectance;
+    const Triangle& t = scene_.texture_indices[hit.primitive];
+    if (t[0] == no_index) return material.reflectance;
+    const Vec2 uv = (1.0f - hit.u - hit.v) * scene_.texture_coordinates[t[0]]
+                    + hit.u * scene_.texture_coordinates[t[1]]
+                    + hit.v * scene_.texture_coordinates[t[2]];
+    return material.reflectance * scene_.textures[material.texture].sample(uv);
+}
+
+} // namespace afterglow

@@ -1,0 +1,68 @@
+#pragma once
+
+#include "core/scene.h"
+#include "core/types.h"
+
+#include <limits>
+#include <memory>
+#include <span>
+
+namespace afterglow {
+
+struct Ray {
+    Vec3 origin;
+    Vec3 direction; // unit length
+    float length = std::numeric_limits<float>::infinity();
+};
+
+/// The closest meeting of a ray with a surface; `primitive` is no_index where there is none.
+struct Hit {
+    float distance = std::numeric_limits<float>::infinity();
+    std::uint32_t primitive = no_index;
+    float u = 0, v = 0;      // barycentric weights of the triangle's second and third corner
+    bool back_side = false;  // the ray came from the side that the triangle's winding calls back
+    explicit operator bool() const { return primitive != no_index; }
+};
+
+/// All that the basis and the transport ask of a scene's geometry: closest hit, occlusion, normal and
+/// reflectance [LZT08, sec. 5.1]. Immutable; all queries may run concurrently. Embree stays inside.
+class Surface {
+public:
+    /// Keeps a reference to `scene`, which must outlive it. Throws Error where Embree fails.
+    explicit Surface(const Scene& scene);
+    ~Surface();
+    Surface(const Surface&) = delete;
+    Surface& operator=(const Surface&) = delete;
+
+    const Scene& scene() const { return scene_; }
+    /// How far ray origins are lifted off a surface along its normal: a few units in the last place
+    /// of the largest coordinate, so that a ray neither meets its own start nor leaks through.
+    float lift() const { return lift_; }
+
+    Hit closest_hit(const Ray& ray) const;
+    /// hits.size() == rays.size(). Packets inside: rays of similar direction should be neighbours.
+    void closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const;
+    /// True where anything lies on the ray before its length.
+    bool occluded(const Ray& ray) const;
+    /// True where the segment between two points, each already lifted off its surface, is blocked.
+    bool blocked(const Vec3& from, const Vec3& to) const;
+
+    /// Position from barycentric weights, and the shading normal (interpolated where the scene has
+    /// normals) turned to the side the ray came from.
+    SurfacePoint point(const Hit& hit) const;
+    /// The triangle's own normal, turned likewise.
+    Vec3 geometric_normal(const Hit& hit) const;
+    /// Reflectance at the hit, textures included.
+    Rgb reflectance(const Hit& hit) const;
+
+    /// Where rays that leave x start.
+    Vec3 lifted(const SurfacePoint& x) const { return x.position + lift_ * x.normal; }
+
+private:
+    struct Tree;
+    const Scene& scene_;
+    float lift_;
+    std::unique_ptr<Tree> tree_;
+};
+
+} // namespace afterglow
