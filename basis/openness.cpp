@@ -1,0 +1,52 @@
+#include "basis/openness.h"
+
+#include "core/sampling.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <vector>
+
+namespace afterglow {
+
+OpennessProbe::OpennessProbe(const Surface& surface, float spacing, int rays)
+    : surface_(surface), spacing_(spacing), directions_(3, rays) {
+    // Neighbouring directions share a ray packet: order by sector, then by height.
+    std::vector<Vec2> u(rays);
+    for (int k = 0; k < rays; ++k) u[k] = scrambled_sobol2(k, 11);
+    std::sort(u.begin(), u.end(), [](const Vec2& a, const Vec2& b) {
+        const int sa = static_cast<int>(a.y() * 4), sb = static_cast<int>(b.y() * 4);
+        return sa != sb ? sa < sb : a.x() < b.x();
+    });
+    for (int k = 0; k < rays; ++k) directions_.col(k) = sample_vector_irradiance(u[k]);
+}
+
+Openness OpennessProbe::operator()(const SurfacePoint& x) const {
+    constexpr int most = 64;
+    std::array<Ray, most> rays;
+    std::array<Hit, most> hits;
+    const Frame frame(x.normal);
+    const Vec3 origin = surface_.lifted(x);
+    Openness sum = Openness::Zero();
+    for (int begin = 0; begin < directions_.cols(); begin += most) {
+        const int count = std::min<int>(most, static_cast<int>(directions_.cols()) - begin);
+        for (int k = 0; k < count; ++k)
+            rays[k] = {origin, frame.to_world(directions_.col(begin + k)), 16.0f * spacing_};
+        surface_.closest_hits(std::span(rays).first(count), std::span(hits).first(count));
+        for (int k = 0; k < count; ++k) {
+            const float weight = 2.0f / (directions_(2, begin + k) + 0.5f);
+            for (int d = 0; d < 3; ++d) {
+                const float scale = spacing_ * (d == 0 ? 0.25f : d == 1 ? 1.0f : 4.0f);
+                const float open = hits[k] ? -std::expm1(-hits[k].distance / scale) : 1.0f;
+                sum.segment<3>(3 * d) += weight * open * rays[k].direction;
+            }
+        }
+    }
+    sum /= static_cast<float>(directions_.cols());
+    for (int d = 0; d < 3; ++d) sum.segment<3>(3 * d) -= x.normal;
+    return sum;
+}
+
+} // namespace afterglow

@@ -1,0 +1,97 @@
+#include "basis/point_hierarchy.h"
+
+#include "basis/morton.h"
+#include "basis/nearest_points.h"
+#include "basis/poisson_disk.h"
+#include "core/parallel.h"
+#include "core/sampling.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+/// Supports of a level whose density varies: a function reaches 1.5 times as far as its fourth
+/// neighbour that faces about the same way, so that everywhere about as many overlap.
+std::vector<float> adaptive_supports(const std::vector<Candidate>& points, float spacing) {
+    constexpr int neighbour = 4, considered = 24;
+    Eigen::Matrix3Xf positions(3, points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) positions.col(i) = points[i].at.position;
+    const NearestPoints nearest(positions);
+    std::vector<float> support(points.size());
+    parallel_for(static_cast<Index>(points.size()), [&](Index i) {
+        const SurfacePoint& x = points[i].at;
+        std::vector<std::uint32_t> near;
+        nearest.closest(x.position, considered, near);
+        std::vector<float> distance;
+        for (const std::uint32_t j : near) {
+            const Vec3& n = points[j].at.normal;
+            if (j == static_cast<std::uint32_t>(i) || n.dot(x.normal) < 0.7f) continue;
+            distance.push_back(std::sqrt(squashed_distance2(points[j].at.position - x.position, n)));
+        }
+        std::sort(distance.begin(), distance.end());
+        const float reach = distance.size() >= neighbour ? distance[neighbour - 1] : spacing;
+        support[i] = 1.5f * std::min(reach, 1.5f * spacing);
+    });
+    return support;
+}
+
+} // namespace
+
+PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& options,
+                               HierarchyStatistics* statistics) {
+    const auto start = std::chrono::steady_clock::now();
+    PointHierarchy hierarchy;
+    hierarchy.shape = options.shape;
+    hierarchy.level_begin = {0};
+    std::vector<std::vector<Candidate>> levels(options.levels);
+    std::vector<std::vector<float>> supports(options.levels);
+    for (int l = 0; l < options.levels; ++l) {
+        const float spacing = std::ldexp(options.coarse_radius, -l);
+        const bool by_openness = options.openness_density > 0.0f && l == options.levels - 1;
+        PoissonDiskOptions disk_options;
+        disk_options.spacing = spacing;
+        disk_options.placement_power = options.shape.placement_power;
+        disk_options.skip_narrow = options.skip_narrow && !by_openness;
+        disk_options.openness_density = by_openness ? options.openness_density : 0.0f;
+        const PoissonDisk disk = poisson_disk(source, disk_options);
+
+        std::vector<Vec3> positions;
+        for (const Candidate& c : disk.points) positions.push_back(c.at.position);
+        for (const std::uint32_t i : morton_order(positions)) levels[l].push_back(disk.points[i]);
+        if (by_openness) {
+            supports[l] = adaptive_supports(levels[l], spacing);
+        } else {
+            const float t = options.levels > 1 ? static_cast<float>(l) / (options.levels - 1) : 0.0f;
+            const float reach = std::lerp(options.shape.reach_coarsest, options.shape.reach_finest, t);
+            supports[l].assign(levels[l].size(), reach * spacing);
+        }
+        hierarchy.spacing.push_back(spacing);
+        hierarchy.level_begin.push_back(hierarchy.level_begin.back()
+                                        + static_cast<std::uint32_t>(levels[l].size()));
+        if (statistics)
+            statistics->level.push_back({static_cast<std::uint32_t>(levels[l].size()),
+                                         disk.candidates_tried, disk.largest_gap});
+    }
+    const Index count = hierarchy.size();
+    hierarchy.position.resize(3, count);
+    hierarchy.normal.resize(3, count);
+    hierarchy.support.resize(count);
+    hierarchy.reflectance.resize(3, count);
+    Index i = 0;
+    for (int l = 0; l < options.levels; ++l)
+        for (std::size_t k = 0; k < levels[l].size(); ++k, ++i) {
+            hierarchy.position.col(i) = levels[l][k].at.position;
+            hierarchy.normal.col(i) = levels[l][k].at.normal;
+            hierarchy.support[i] = supports[l][k];
+            hierarchy.reflectance.col(i) = source.surface().reflectance(levels[l][k].hit).matrix();
+        }
+    if (statistics)
+        statistics->seconds
+            = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return hierarchy;
+}
+
+} // namespace afterglow

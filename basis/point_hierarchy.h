@@ -1,0 +1,57 @@
+#pragma once
+
+#include "basis/candidates.h"
+#include "basis/openness.h"
+#include "basis/shepard.h"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <vector>
+
+namespace afterglow {
+
+/// The N points that carry the basis, in L levels, coarse to fine; within a level in Morton order.
+/// Function i has its centre at point i.
+struct PointHierarchy {
+    Eigen::Matrix3Xf position;              // 3 x N, world space
+    Eigen::Matrix3Xf normal;                // 3 x N, unit length
+    Eigen::VectorXf support;                // N, radius outside which the weight is zero [world]
+    Eigen::Matrix3Xf reflectance;           // 3 x N, of the surface at the point
+    std::vector<std::uint32_t> level_begin; // L + 1; level l is [level_begin[l], level_begin[l + 1])
+    std::vector<float> spacing;             // L, the Poisson-disk radius R_l [world]
+    BasisShape shape;
+
+    int levels() const { return static_cast<int>(spacing.size()); }
+    std::uint32_t size() const { return level_begin.back(); }
+    std::uint32_t begin(int level) const { return level_begin[level]; }
+    std::uint32_t end(int level) const { return level_begin[level + 1]; }
+    SurfacePoint point(Index i) const { return {position.col(i), normal.col(i)}; }
+};
+
+struct HierarchyOptions {
+    float coarse_radius = 0.0f;  // R of level 0 [world]; halves from level to level
+    int levels = 5;              // all of them
+    BasisShape shape;
+    /// Density s of the openness feature on the finest level, 0 for a plain finest level.
+    float openness_density = 0.1f;
+    bool skip_narrow = true;     // on every level but an openness level
+    std::uint64_t seed = 1;
+};
+
+struct LevelStatistics {
+    std::uint32_t points = 0;
+    std::uint64_t candidates_tried = 0;
+    float largest_gap = 0.0f; // in units of R, see PoissonDisk
+};
+
+struct HierarchyStatistics {
+    std::vector<LevelStatistics> level;
+    double seconds = 0.0;
+};
+
+/// Builds the hierarchy from the source's candidates [LZT08, sec. 2.3].
+PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& options,
+                               HierarchyStatistics* statistics = nullptr);
+
+} // namespace afterglow

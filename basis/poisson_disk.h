@@ -1,0 +1,46 @@
+#pragma once
+
+#include "basis/candidates.h"
+#include "basis/openness.h"
+#include "basis/shepard.h"
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace afterglow {
+
+struct PoissonDiskOptions {
+    float spacing = 1.0f;     // R: no two points are closer than this in the distance D [world]
+    int placement_power = 16; // of the cosine in D, see BasisShape
+    /// Leave out narrow places, where the harmonic mean distance to what is around is below R/6
+    /// [LZT08, sec. 2.3]; finer levels fill them.
+    bool skip_narrow = false;
+    /// With a density s > 0, points may come as close as R/8 where the openness feature changes:
+    /// y conflicts with x if D < R/8, or if D exp(|dF|^2 / (2 s^2)) < R.
+    float openness_density = 0.0f;
+    int openness_rays = 48;
+    std::size_t first_candidate = 0; // where in the source's sequence to begin
+    int failures_to_end = 2000;      // the set is maximal once so many candidates failed in a row
+};
+
+struct PoissonDisk {
+    std::vector<Candidate> points;
+    std::vector<Openness> openness;  // a point each where a density was asked, else empty
+    std::size_t candidates_tried = 0;
+    std::uint64_t rays = 0;          // of features and harmonic means
+    /// Of fresh candidates at the end, the largest D to the closest point, in units of R (1 where
+    /// there is none within R); narrow places left out on purpose do not count.
+    float largest_gap = 0.0f;
+};
+
+/// A maximal Poisson-disk set of the candidates by dart throwing, under
+///
+///     D(x, y) = min(d_x(y), d_y(x)) / max(0, n_x . n_y)^power     [LZT08, eq. (11)].
+///
+/// Cells of size R, in eight classes whose members cannot conflict, are filled in parallel; the
+/// result does not depend on the number of threads. D is never below the Euclidean distance, so the
+/// 27 cells around a candidate decide.
+PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options);
+
+} // namespace afterglow
