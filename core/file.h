@@ -9,9 +9,15 @@
 namespace afterglow {
 
 /// Writes a file through `write(temporary_path)` beside its target and renames it over it when that
-/// returns; on any failure nothing is left behind. Throws FileError where the rename or sync fails.
+/// returns; on any failure nothing is left behind and a file that was there stays as it was. Throws
+/// FileError where the rename or sync fails. A symbolic link is followed; a device is written to
+/// directly. `write` must report its own errors (write_bytes() does).
 void write_atomically(const std::string& path,
                       const std::function<void(const std::string& temporary_path)>& write);
+
+/// Writes all bytes to a file or device, or throws FileError: a full disk does not go unnoticed.
+/// Not atomic by itself: call it inside write_atomically().
+void write_bytes(const std::string& path, std::span<const std::byte> bytes);
 
 /// A whole file, mapped read-only. Throws FileError.
 class MappedFile {

@@ -1,0 +1,45 @@
+#include "core/camera.h"
+
+#include "core/error.h"
+
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <string>
+
+namespace afterglow {
+namespace {
+
+constexpr int largest_side = 1 << 16; // pixels; more is a slip of the keyboard
+
+} // namespace
+
+void Camera::check() const {
+    if (!position.allFinite() || !target.allFinite() || !up.allFinite()
+        || !std::isfinite(vertical_fov))
+        throw UsageError("camera: position, target, up and field of view must be finite numbers");
+    if (width < 1 || height < 1 || width > largest_side || height > largest_side)
+        throw UsageError("camera: a picture of " + std::to_string(width) + "x"
+                         + std::to_string(height) + " pixels is impossible; give 1 to "
+                         + std::to_string(largest_side) + " a side");
+    if (!(vertical_fov > 0.0f && vertical_fov < 180.0f))
+        throw UsageError("camera: the vertical field of view must lie between 0 and 180 degrees");
+    const Vec3 view = (target - position).stableNormalized();
+    if (!(view.norm() > 0.5f)) throw UsageError("camera: target and position are the same place");
+    if (!(view.cross(up.stableNormalized()).norm() > 1e-5f))
+        throw UsageError("camera: up is zero or points along the view; choose another up");
+}
+
+Vec3 Camera::direction(float x, float y) const {
+    const Vec3 forward = (target - position).stableNormalized();
+    const Vec3 right = forward.cross(up.stableNormalized()).normalized();
+    const Vec3 top = right.cross(forward);
+    const float half_height = std::tan(vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+    const float pixel =
+        2.0f * half_height / static_cast<float>(height); // on the plane at distance 1
+    return (forward + (x - 0.5f * static_cast<float>(width)) * pixel * right
+            + (0.5f * static_cast<float>(height) - y) * pixel * top)
+        .normalized();
+}
+
+} // namespace afterglow

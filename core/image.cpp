@@ -1,0 +1,194 @@
+#include "core/image.h"
+
+#include "core/error.h"
+#include "core/file.h"
+
+#include <ImathBox.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStdIO.h>
+#include <ImfStringAttribute.h>
+#include <stb_image_write.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <half.h>
+#include <span>
+
+namespace afterglow {
+namespace {
+
+constexpr const char* channel_names[3] = {"R", "G", "B"};
+constexpr std::int64_t most_pixels = std::int64_t{1}
+                                     << 27; // a damaged header must not ask for more
+
+std::size_t pixel_count(const Image& image) {
+    return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+}
+
+/// Slices over interleaved RGB values whose first pixel belongs at the corner of `window`.
+template <class T>
+Imf::FrameBuffer frame_buffer(T* rgb, Imf::PixelType type, const Imath::Box2i& window) {
+    const std::size_t pixel = 3 * sizeof(T);
+    const auto width = static_cast<std::size_t>(window.max.x - window.min.x + 1);
+    Imf::FrameBuffer buffer;
+    for (int c = 0; c < 3; ++c)
+        buffer.insert(channel_names[c],
+                      Imf::Slice::Make(type, rgb + c, window, pixel, width * pixel));
+    return buffer;
+}
+
+std::vector<half> to_half(const std::vector<float>& values) {
+    std::vector<half> halves(values.size());
+    std::transform(values.begin(), values.end(), halves.begin(), [](float x) {
+        return half(std::isfinite(x) ? std::clamp(x, -float{HALF_MAX}, float{HALF_MAX}) : x);
+    });
+    return halves;
+}
+
+std::string encode_exr(const Image& image, PixelType type) {
+    Imf::Header header(image.width, image.height);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    for (const auto& [name, text] : image.attributes)
+        header.insert(name, Imf::StringAttribute(text));
+    const auto exr_type = type == PixelType::half_float ? Imf::HALF : Imf::FLOAT;
+    for (const char* name : channel_names)
+        header.channels().insert(name, Imf::Channel(exr_type));
+
+    std::vector<float> floats;
+    std::vector<half> halves;
+    Imf::FrameBuffer buffer;
+    if (type == PixelType::half_float) {
+        halves = to_half(image.rgb);
+        buffer = frame_buffer(halves.data(), exr_type, header.dataWindow());
+    } else {
+        floats = image.rgb; // the library asks for writable memory
+        buffer = frame_buffer(floats.data(), exr_type, header.dataWindow());
+    }
+    // Into memory first: the library's own file writer cannot report a disk that fills up at the
+    // end.
+    Imf::StdOSStream stream;
+    {
+        Imf::OutputFile file(stream, header);
+        file.setFrameBuffer(buffer);
+        file.writePixels(image.height);
+    }
+    return stream.str();
+}
+
+float luminance(const Rgb& c) {
+    return 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
+}
+
+/// Reinhard, Stark, Shirley and Ferwerda 2002, eqs. (1), (2) and (4): luminance is scaled so that
+/// its log-average becomes `key`, then compressed so that the brightest pixel becomes white. Black
+/// pixels (nothing seen) stay out of the average, and a picture darker than white is not brightened
+/// (white is at least 1, where eq. (4) is the identity).
+struct ToneMap {
+    float scale = 1.0f, white = 1.0f;
+
+    ToneMap(const Image& image, float key) {
+        double sum_of_logs = 0.0;
+        float largest = 0.0f;
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < pixel_count(image); ++i) {
+            const float l = luminance(Rgb::Map(&image.rgb[3 * i]));
+            if (!(l > 0.0f) || !std::isfinite(l)) continue;
+            sum_of_logs += std::log(l);
+            largest = std::max(largest, l);
+            ++count;
+        }
+        if (count == 0) return;
+        scale = static_cast<float>(key / std::exp(sum_of_logs / static_cast<double>(count)));
+        white = std::max(1.0f, scale * largest);
+    }
+    Rgb operator()(const Rgb& c) const {
+        const float l = std::max(0.0f, scale * luminance(c));
+        return c * scale * (1.0f + l / (white * white)) / (1.0f + l);
+    }
+};
+
+unsigned char srgb_byte(float linear) {
+    if (!(linear > 0.0f)) return 0; // NaN as well
+    const float x = std::min(linear, 1.0f);
+    const float s = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1.0f / 2.4f) - 0.055f;
+    return static_cast<unsigned char>(std::lround(255.0f * s));
+}
+
+std::string encode_png(const Image& image, float key) {
+    const ToneMap tone_map(image, key);
+    std::vector<unsigned char> bytes(3 * pixel_count(image));
+    for (std::size_t i = 0; i < pixel_count(image); ++i) {
+        const Rgb mapped = tone_map(Rgb::Map(&image.rgb[3 * i]));
+        for (int c = 0; c < 3; ++c)
+            bytes[3 * i + c] = srgb_byte(mapped[c]);
+    }
+    std::string png;
+    const auto append = [](void* target, void* data, int size) {
+        static_cast<std::string*>(target)->append(static_cast<const char*>(data),
+                                                  static_cast<std::size_t>(size));
+    };
+    const bool done = stbi_write_png_to_func(append, &png, image.width, image.height, 3,
+                                             bytes.data(), 3 * image.width)
+                      != 0;
+    if (!done) throw Error("not enough memory to compress the picture");
+    return png;
+}
+
+} // namespace
+
+void write_image(const std::string& path, const Image& image, PixelType type, float exposure) {
+    assert(image.width > 0 && image.height > 0 && image.rgb.size() == 3 * pixel_count(image));
+    std::string encoded;
+    try {
+        if (path.ends_with(".exr"))
+            encoded = encode_exr(image, type);
+        else if (path.ends_with(".png"))
+            encoded = encode_png(image, exposure);
+        else
+            throw UsageError(path + ": a picture's name must end in .exr or .png");
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& e) {
+        throw FileError(path, std::string("cannot be encoded: ") + e.what());
+    }
+    write_atomically(path, [&](const std::string& temporary) {
+        write_bytes(temporary, std::as_bytes(std::span(encoded)));
+    });
+}
+
+Image read_exr(const std::string& path) {
+    try {
+        Imf::InputFile file(path.c_str());
+        const Imf::Header& header = file.header();
+        const Imath::Box2i window = header.dataWindow();
+        const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
+        const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+        if (width < 1 || height < 1 || width > most_pixels / height)
+            throw FileError(path, "has an impossible size of " + std::to_string(width) + "x"
+                                      + std::to_string(height) + " pixels");
+        for (const char* name : channel_names) {
+            const Imf::Channel* channel = header.channels().findChannel(name);
+            if (!channel || channel->xSampling != 1 || channel->ySampling != 1)
+                throw FileError(path, std::string("has no full-size channel ") + name
+                                          + "; R, G and B are needed");
+        }
+        Image image(static_cast<int>(width), static_cast<int>(height));
+        file.setFrameBuffer(frame_buffer(image.rgb.data(), Imf::FLOAT, window));
+        file.readPixels(window.min.y, window.max.y);
+        for (auto a = header.begin(); a != header.end(); ++a)
+            if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&a.attribute()))
+                image.attributes[a.name()] = text->value();
+        return image;
+    } catch (const Error&) {
+        throw;
+    } catch (const std::exception& e) {
+        throw FileError(path, std::string("cannot be read as OpenEXR: ") + e.what());
+    }
+}
+
+} // namespace afterglow

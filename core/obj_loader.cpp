@@ -1,0 +1,501 @@
+#include "core/obj_loader.h"
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/polygon.h"
+
+#include <Eigen/Geometry>
+#include <stb_image.h>
+#include <tiny_obj_loader.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <istream>
+#include <map>
+#include <streambuf>
+#include <string_view>
+
+namespace afterglow {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float largest_coordinate = 1e18f;      // Embree's limit; cross products still fit a float
+constexpr float largest_reflectance = 0.999f;    // at one, light would bounce forever
+constexpr std::size_t most_indices = 0x7fffffff; // tinyobjloader reads indices as int
+constexpr int most_texels = 1 << 26;
+
+// ---- Text
+// -------------------------------------------------------------------------------------------
+
+std::string_view trimmed(std::string_view text) {
+    const auto begin = text.find_first_not_of(" \t\r\n");
+    if (begin == std::string_view::npos) return {};
+    return text.substr(begin, text.find_last_not_of(" \t\r\n") - begin + 1);
+}
+
+/// Hands the mapped file to tinyobjloader line by line. tinyobjloader reads what is no number
+/// ("nan",
+/// "-inf", "1.#IND") as a plausible zero; here it becomes 1e999, hence infinite, and the triangles
+/// that use it can be told.
+class LineBuffer : public std::streambuf {
+public:
+    explicit LineBuffer(std::string_view text) : rest_(text) {}
+
+    /// The line that is being read.
+    std::string_view line() const { return line_; }
+
+private:
+    int_type underflow() override {
+        if (rest_.empty()) return traits_type::eof();
+        std::size_t length = 0;
+        while (length < rest_.size() && rest_[length] != '\n' && rest_[length] != '\r')
+            ++length;
+        length += rest_.substr(length, 2) == "\r\n" ? 2 : 1;
+        line_ = rest_.substr(0, length);
+        rest_.remove_prefix(line_.size());
+        std::string_view shown = line_;
+        if (has_odd_number(line_)) {
+            rewritten_ = with_infinities(line_);
+            shown = rewritten_;
+        }
+        char* begin = const_cast<char*>(shown.data()); // the base class reads only
+        setg(begin, begin, begin + shown.size());
+        return traits_type::to_int_type(*begin);
+    }
+
+    static bool is_number_character(char c) {
+        return (c >= '0' && c <= '9') || c == '+' || c == '-' || c == '.' || c == 'e' || c == 'E';
+    }
+    static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+    /// Where the numbers of a line "v ...", "vn ..." or "vt ..." begin; 0 for other lines.
+    static std::size_t start_of_numbers(std::string_view line) {
+        std::size_t i = 0;
+        while (i < line.size() && is_space(line[i]))
+            ++i;
+        if (i == line.size() || line[i] != 'v') return 0;
+        ++i;
+        if (i < line.size() && (line[i] == 'n' || line[i] == 't')) ++i;
+        return i < line.size() && is_space(line[i]) ? i : 0;
+    }
+    static bool has_odd_number(std::string_view line) {
+        const std::size_t start = start_of_numbers(line);
+        if (start == 0) return false;
+        return !std::all_of(line.begin() + static_cast<std::ptrdiff_t>(start), line.end(),
+                            [](char c) { return is_number_character(c) || is_space(c); });
+    }
+    static std::string with_infinities(std::string_view line) {
+        std::size_t i = start_of_numbers(line);
+        std::string result(line.substr(0, i));
+        while (i < line.size()) {
+            const std::size_t begin = i;
+            while (i < line.size() && !is_space(line[i]))
+                ++i;
+            const std::string_view token = line.substr(begin, i - begin);
+            const bool is_number = std::all_of(token.begin(), token.end(), is_number_character);
+            result += is_number ? token : std::string_view("1e999");
+            if (i < line.size()) result += line[i++];
+        }
+        return result;
+    }
+
+    std::string_view rest_, line_;
+    std::string rewritten_;
+};
+
+// ---- Materials and textures
+// -------------------------------------------------------------------------
+
+struct MaterialSource {
+    Material material;
+    std::string texture_file; // path, empty where there is none
+};
+
+/// Names in OBJ and MTL files may be written on another system.
+fs::path beside(const fs::path& folder, std::string_view name) {
+    std::string portable(trimmed(name));
+    std::replace(portable.begin(), portable.end(), '\\', '/');
+    return folder / portable;
+}
+
+bool is_file(const fs::path& path) {
+    std::error_code ignored;
+    return fs::is_regular_file(path, ignored);
+}
+
+/// Reads the MTL files that the OBJ file names.
+class MaterialFiles : public tinyobj::MaterialReader {
+public:
+    MaterialFiles(fs::path folder, const LineBuffer& obj, SceneSummary& summary)
+        : folder_(std::move(folder)), obj_(obj), summary_(summary) {}
+
+    bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
+                    std::map<std::string, int>* index, std::string* warnings,
+                    std::string* errors) override {
+        // tinyobjloader splits the line at spaces; most often it is one name that contains them.
+        std::string_view line = trimmed(obj_.line());
+        line.remove_prefix(std::min(line.size(), std::strlen("mtllib")));
+        const fs::path whole = beside(folder_, line), part = beside(folder_, name);
+        const fs::path& path = is_file(whole) ? whole : part;
+
+        std::ifstream file(path);
+        if (!is_file(path) || !file) {
+            summary_.missing_files.push_back(path.string());
+            return false;
+        }
+        const std::size_t known = materials->size();
+        tinyobj::LoadMtl(index, materials, &file, warnings, errors);
+        for (std::size_t i = known; i < materials->size(); ++i)
+            sources.push_back(convert((*materials)[i], path.parent_path()));
+        return true;
+    }
+
+    std::vector<MaterialSource> sources; // in tinyobjloader's order
+
+private:
+    static MaterialSource convert(const tinyobj::material_t& from, const fs::path& folder) {
+        MaterialSource source;
+        source.material.name = trimmed(from.name);
+        source.material.reflectance = Rgb(from.diffuse[0], from.diffuse[1], from.diffuse[2]);
+        if (!trimmed(from.diffuse_texname).empty())
+            source.texture_file = beside(folder, from.diffuse_texname).string();
+        return source;
+    }
+
+    fs::path folder_;
+    const LineBuffer& obj_;
+    SceneSummary& summary_;
+};
+
+float linear_from_srgb(int byte) {
+    const float s = static_cast<float>(byte) / 255.0f;
+    return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
+}
+
+/// Throws FileError where the file holds no picture that stb_image reads.
+Texture read_texture(const std::string& path) {
+    const MappedFile file(path);
+    const auto bytes = file.bytes();
+    const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+    const int size = bytes.size() <= most_indices ? static_cast<int>(bytes.size()) : 0;
+    Texture texture;
+    int channels = 0;
+    if (!stbi_info_from_memory(data, size, &texture.width, &texture.height, &channels)
+        || texture.width < 1 || texture.height < 1 || texture.width > most_texels / texture.height)
+        throw FileError(path, "is no picture of a usable size");
+    const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
+        stbi_load_from_memory(data, size, &texture.width, &texture.height, &channels, 3),
+        stbi_image_free);
+    if (!texels) throw FileError(path, "is damaged");
+
+    std::array<float, 256> linear{};
+    for (int i = 0; i < 256; ++i)
+        linear[static_cast<std::size_t>(i)] = linear_from_srgb(i);
+    const std::size_t row = 3 * static_cast<std::size_t>(texture.width);
+    texture.rgb.resize(row * static_cast<std::size_t>(texture.height));
+    for (int y = 0; y < texture.height; ++y) { // the file's first row is on top
+        const stbi_uc* from = texels.get() + row * static_cast<std::size_t>(texture.height - 1 - y);
+        std::transform(from, from + row, &texture.rgb[row * static_cast<std::size_t>(y)],
+                       [&](stbi_uc byte) { return linear[byte]; });
+    }
+    return texture;
+}
+
+// ---- Faces
+// ------------------------------------------------------------------------------------------
+
+/// One corner of a face: indices from zero, no_index where absent, bad_index where impossible.
+struct Corner {
+    std::uint32_t position, texture, normal;
+};
+constexpr std::uint32_t bad_index = no_index - 1;
+
+struct Face {
+    std::uint32_t corners;
+    int material; // of MaterialFiles::sources, -1 for none
+};
+
+/// What the file says, before anything is checked against anything.
+struct RawObj {
+    std::vector<Vec3> positions, normals;
+    std::vector<Vec2> texture_coordinates;
+    std::vector<Corner> corners; // of all faces in turn
+    std::vector<Face> faces;
+    std::vector<MaterialSource> materials;
+};
+
+/// Collects tinyobjloader's calls into a RawObj.
+struct Collector {
+    RawObj& raw;
+    const std::string& path;
+    std::map<std::string, int, std::less<>> material_by_name{};
+    const std::vector<MaterialSource>& sources;
+    int material = -1;
+
+    void check_count(std::size_t count) const {
+        if (count >= most_indices)
+            throw FileError(path, "has more than " + std::to_string(most_indices)
+                                      + " vertices or corners; split it");
+    }
+    /// OBJ counts from 1, backwards from the last element below zero, and 0 is no index.
+    static std::uint32_t resolve(int index, std::size_t count) {
+        if (index > 0) return static_cast<std::uint32_t>(index - 1);
+        if (index == 0) return no_index;
+        const std::int64_t from_end = static_cast<std::int64_t>(count) + index;
+        return from_end >= 0 ? static_cast<std::uint32_t>(from_end) : bad_index;
+    }
+    void add_face(const tinyobj::index_t* index, int count) {
+        check_count(raw.corners.size() + static_cast<std::size_t>(count));
+        for (int i = 0; i < count; ++i)
+            raw.corners.push_back({resolve(index[i].vertex_index, raw.positions.size()),
+                                   resolve(index[i].texcoord_index, raw.texture_coordinates.size()),
+                                   resolve(index[i].normal_index, raw.normals.size())});
+        raw.faces.push_back({static_cast<std::uint32_t>(count), material});
+    }
+    /// tinyobjloader compares whole lines with whole lines: blanks at the end of one hide the
+    /// other.
+    void use_material(std::string_view name, int id) {
+        material = id;
+        if (material >= 0) return;
+        for (std::size_t i = material_by_name.size(); i < sources.size(); ++i)
+            material_by_name.try_emplace(sources[i].material.name, static_cast<int>(i));
+        const auto found = material_by_name.find(trimmed(name));
+        if (found != material_by_name.end()) material = found->second;
+    }
+};
+
+tinyobj::callback_t callbacks() {
+    tinyobj::callback_t to;
+    to.vertex_cb = [](void* user, float x, float y, float z, float) {
+        auto& c = *static_cast<Collector*>(user);
+        c.check_count(c.raw.positions.size());
+        c.raw.positions.emplace_back(x, y, z);
+    };
+    to.normal_cb = [](void* user, float x, float y, float z) {
+        static_cast<Collector*>(user)->raw.normals.emplace_back(x, y, z);
+    };
+    to.texcoord_cb = [](void* user, float x, float y, float) {
+        static_cast<Collector*>(user)->raw.texture_coordinates.emplace_back(x, y);
+    };
+    to.index_cb = [](void* user, tinyobj::index_t* index, int count) {
+        static_cast<Collector*>(user)->add_face(index, count);
+    };
+    to.usemtl_cb = [](void* user, const char* name, int id) {
+        static_cast<Collector*>(user)->use_material(name, id);
+    };
+    return to;
+}
+
+RawObj parse(const std::string& path, SceneSummary& summary) {
+    const MappedFile file(path);
+    LineBuffer lines({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
+    std::istream stream(&lines);
+    stream.exceptions(std::ios::badbit); // errors of our own calls come through
+    MaterialFiles material_files(fs::path(path).parent_path(), lines, summary);
+
+    RawObj raw;
+    Collector collector{raw, path, {}, material_files.sources};
+    tinyobj::LoadObjWithCallback(stream, callbacks(), &collector, &material_files);
+    raw.materials = std::move(material_files.sources);
+    return raw;
+}
+
+// ---- From faces to a scene
+// --------------------------------------------------------------------------
+
+bool usable(const Vec3& p) {
+    return (p.array().abs() <= largest_coordinate).all();
+}
+
+/// Neither a line nor a point, as seen from its own size, and with a normal that fits a float.
+bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
+    const Eigen::Vector3d ab = (b - a).cast<double>(), ac = (c - a).cast<double>();
+    const double twice_area = ab.cross(ac).norm();
+    const double longest = std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()});
+    return twice_area > 2e-12 * longest && twice_area > 1e-36;
+}
+
+class SceneMaker {
+public:
+    SceneMaker(RawObj& raw, Scene& scene) : raw_(raw), scene_(scene) {
+        new_material_.assign(raw.materials.size() + 1, no_index);
+        normalise_normals();
+    }
+
+    void add_faces() {
+        scene_.summary.faces = raw_.faces.size();
+        std::size_t triangles = 0;
+        for (const Face& face : raw_.faces)
+            triangles += std::max(face.corners, 2u) - 2;
+        scene_.triangles.reserve(triangles);
+        scene_.material_index.reserve(triangles);
+        if (!raw_.normals.empty()) scene_.normal_indices.reserve(triangles);
+        if (!raw_.texture_coordinates.empty()) scene_.texture_indices.reserve(triangles);
+
+        const Corner* corner = raw_.corners.data();
+        for (const Face& face : raw_.faces) {
+            add_face({corner, face.corners}, face.material);
+            corner += face.corners;
+        }
+        scene_.summary.triangles = scene_.triangles.size();
+    }
+
+    /// Keeps only the vertices that a triangle uses: a stray one would stretch the bounds.
+    void take_vertices() {
+        std::vector<std::uint32_t> renamed(raw_.positions.size(), no_index);
+        for (Triangle& triangle : scene_.triangles)
+            for (std::uint32_t& index : triangle)
+                renamed[index] = 0;
+        std::uint32_t count = 0;
+        for (std::size_t i = 0; i < renamed.size(); ++i) {
+            if (renamed[i] == no_index) continue;
+            renamed[i] = count;
+            raw_.positions[count++] = raw_.positions[i];
+        }
+        raw_.positions.resize(count);
+        for (Triangle& triangle : scene_.triangles)
+            for (std::uint32_t& index : triangle)
+                index = renamed[index];
+        scene_.positions = std::move(raw_.positions);
+        scene_.normals = std::move(raw_.normals);
+        scene_.texture_coordinates = std::move(raw_.texture_coordinates);
+    }
+
+private:
+    void normalise_normals() {
+        normal_usable_.resize(raw_.normals.size());
+        for (std::size_t i = 0; i < raw_.normals.size(); ++i) {
+            const Vec3 unit = raw_.normals[i].stableNormalized();
+            normal_usable_[i] = std::abs(unit.norm() - 1.0f) < 1e-3f; // false for zero and NaN
+            raw_.normals[i] = normal_usable_[i] ? unit : Vec3(Vec3::UnitY());
+        }
+        for (Vec2& uv : raw_.texture_coordinates) {
+            texture_usable_.push_back(uv.allFinite());
+            if (!texture_usable_.back()) uv.setZero();
+        }
+    }
+
+    void add_face(std::span<const Corner> corner, int material) {
+        SceneSummary& summary = scene_.summary;
+        if (corner.size() < 3) {
+            ++summary.dropped_degenerate;
+            return;
+        }
+        polygon_.clear();
+        for (const Corner& c : corner) {
+            if (c.position >= raw_.positions.size()) {
+                summary.dropped_bad_index += corner.size() - 2;
+                return;
+            }
+            polygon_.push_back(raw_.positions[c.position]);
+        }
+        if (!std::all_of(polygon_.begin(), polygon_.end(), usable)) {
+            summary.dropped_not_finite += corner.size() - 2;
+            return;
+        }
+        cuts_.clear();
+        triangulate(polygon_, cuts_);
+        for (const auto& cut : cuts_) {
+            if (has_area(polygon_[cut[0]], polygon_[cut[1]], polygon_[cut[2]]))
+                add_triangle({corner[cut[0]], corner[cut[1]], corner[cut[2]]}, material);
+            else
+                ++summary.dropped_degenerate;
+        }
+    }
+
+    void add_triangle(const std::array<Corner, 3>& c, int material) {
+        scene_.triangles.push_back({c[0].position, c[1].position, c[2].position});
+        scene_.material_index.push_back(material_of(material));
+        if (!raw_.normals.empty()) {
+            const Triangle n{c[0].normal, c[1].normal, c[2].normal};
+            for (const std::uint32_t i : n)
+                scene_.summary.replaced_normals += is_bad(i, normal_usable_);
+            scene_.normal_indices.push_back(complete(n, normal_usable_));
+        }
+        if (!raw_.texture_coordinates.empty())
+            scene_.texture_indices.push_back(
+                complete({c[0].texture, c[1].texture, c[2].texture}, texture_usable_));
+    }
+
+    static bool is_bad(std::uint32_t index, const std::vector<bool>& is_usable) {
+        return index != no_index && (index >= is_usable.size() || !is_usable[index]);
+    }
+    static Triangle complete(const Triangle& t, const std::vector<bool>& is_usable) {
+        const bool whole = std::all_of(t.begin(), t.end(), [&](std::uint32_t i) {
+            return i != no_index && !is_bad(i, is_usable);
+        });
+        return whole ? t : Triangle{no_index, no_index, no_index};
+    }
+
+    /// Index in scene_.materials, which holds only what is used; the last place of new_material_ is
+    /// the material of faces that have none.
+    std::uint32_t material_of(int material) {
+        const bool known = material >= 0;
+        scene_.summary.default_material += !known;
+        std::uint32_t& index =
+            new_material_[known ? static_cast<std::size_t>(material) : raw_.materials.size()];
+        if (index == no_index) {
+            index = static_cast<std::uint32_t>(scene_.materials.size());
+            scene_.materials.push_back(
+                known ? checked(raw_.materials[static_cast<std::size_t>(material)])
+                      : Material{"default", Rgb::Constant(0.5f), no_index});
+        }
+        return index;
+    }
+
+    Material checked(const MaterialSource& source) {
+        Material material = source.material;
+        bool clamped = false;
+        for (float& value : material.reflectance) {
+            const float given = value;
+            value = given > 0.0f ? std::min(given, largest_reflectance) : 0.0f; // NaN as well
+            clamped = clamped || value != given;
+        }
+        scene_.summary.clamped_reflectance += clamped;
+        if (!source.texture_file.empty()) material.texture = texture_of(source.texture_file);
+        return material;
+    }
+
+    std::uint32_t texture_of(const std::string& file) {
+        const auto [known, is_new] = texture_by_file_.try_emplace(file, no_index);
+        if (is_new) {
+            try {
+                scene_.textures.push_back(read_texture(file));
+                known->second = static_cast<std::uint32_t>(scene_.textures.size() - 1);
+            } catch (const FileError&) {
+                scene_.summary.missing_files.push_back(file);
+            }
+        }
+        return known->second;
+    }
+
+    RawObj& raw_;
+    Scene& scene_;
+    std::vector<bool> normal_usable_, texture_usable_;
+    std::vector<std::uint32_t> new_material_;
+    std::map<std::string, std::uint32_t> texture_by_file_;
+    std::vector<Vec3> polygon_;
+    std::vector<std::array<std::uint32_t, 3>> cuts_;
+};
+
+} // namespace
+
+Scene load_obj(const std::string& path) {
+    Scene scene;
+    scene.name = path;
+    RawObj raw = parse(path, scene.summary);
+    SceneMaker maker(raw, scene);
+    maker.add_faces();
+    if (scene.triangles.empty())
+        throw FileError(path, raw.faces.empty()
+                                  ? "holds no faces; a Wavefront OBJ file is needed"
+                                  : "holds no usable triangle (" + scene.summary.line() + ")");
+    maker.take_vertices();
+    return scene;
+}
+
+} // namespace afterglow
