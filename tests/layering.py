@@ -20,7 +20,7 @@ LIBRARIES = {  # how the included path starts -> the .cpp files, or folders of t
     r"stb/|stb_": {"core/image.cpp", "core/obj_loader.cpp"},
     r"tiny_obj_loader": {"core/obj_loader.cpp"},
     r"tbb/|oneapi/": {"core/parallel.cpp"},
-    r"nanoflann": {"basis/"},
+    r"nanoflann": {"basis/nearest_points.cpp"},
     r"xxhash": {"core/file.cpp", "transport/safetensors.cpp"},
     r"nlohmann/": {"transport/", "viewer/"},
     r"CLI/": {"transport/", "viewer/"},
