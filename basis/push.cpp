@@ -1,0 +1,94 @@
+#include "basis/push.h"
+
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <array>
+
+namespace afterglow {
+namespace {
+
+constexpr int most_channels = 9;
+
+/// values_i += sign * sum_k weight_ik values_k for the points of one level.
+void add_prediction(const SparseRows<float>& parents, Index begin, Index end, int channels, float sign,
+                    std::span<float> values) {
+    parallel_for(
+        end - begin,
+        [&](Index k) {
+            const Index i = begin + k;
+            std::array<float, most_channels> sum{};
+            const auto index = parents.indices(i);
+            const auto weight = parents.values(i);
+            for (std::size_t e = 0; e < index.size(); ++e) {
+                const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
+                for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
+            }
+            float* to = &values[static_cast<std::size_t>(i) * channels];
+            for (int c = 0; c < channels; ++c) to[c] += sign * sum[c];
+        },
+        1024);
+}
+
+} // namespace
+
+void PushOperator::push(const PointHierarchy& points, int levels, int channels,
+                        std::span<float> values) const {
+    for (int l = 1; l < levels; ++l)
+        add_prediction(parents, points.begin(l), points.end(l), channels, 1.0f, values);
+}
+
+void PushOperator::difference(const PointHierarchy& points, int levels, int channels,
+                              std::span<float> values) const {
+    for (int l = levels - 1; l > 0; --l)
+        add_prediction(parents, points.begin(l), points.end(l), channels, -1.0f, values);
+}
+
+PushOperator make_push_operator(const ShepardBasis& basis) {
+    const PointHierarchy& points = basis.points();
+    std::vector<std::vector<BasisEntry>> rows(points.size());
+    for (int l = 1; l < points.levels(); ++l)
+        parallel_for(points.end(l) - points.begin(l), [&](Index k) {
+            const Index i = points.begin(l) + k;
+            basis.evaluate_or_nearest(l - 1, points.point(i), rows[i]);
+        });
+    return {join_rows(std::move(rows))};
+}
+
+PullOperator::PullOperator(const PointHierarchy& points, const PushOperator& push, int levels)
+    : levels_(levels) {
+    std::vector<std::vector<BasisEntry>> rows(points.end(levels - 1));
+    for (Index i = points.end(0); i < points.end(levels - 1); ++i) {
+        const auto index = push.parents.indices(i);
+        const auto weight = push.parents.values(i);
+        for (std::size_t e = 0; e < index.size(); ++e)
+            rows[index[e]].push_back({static_cast<std::uint32_t>(i), weight[e]});
+    }
+    for (auto& row : rows) {
+        float sum = 0.0f;
+        for (const BasisEntry& entry : row) sum += entry.value;
+        for (BasisEntry& entry : row) entry.value /= sum;
+    }
+    children_ = join_rows(std::move(rows));
+}
+
+void PullOperator::pull(const PointHierarchy& points, int channels, std::span<float> values) const {
+    for (int l = levels_ - 2; l >= 0; --l)
+        parallel_for(
+            points.end(l) - points.begin(l),
+            [&](Index k) {
+                const Index i = points.begin(l) + k;
+                const auto index = children_.indices(i);
+                const auto weight = children_.values(i);
+                if (index.empty()) return;
+                std::array<float, most_channels> sum{};
+                for (std::size_t e = 0; e < index.size(); ++e) {
+                    const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
+                    for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
+                }
+                std::copy_n(sum.begin(), channels, &values[static_cast<std::size_t>(i) * channels]);
+            },
+            256);
+}
+
+} // namespace afterglow

@@ -1,0 +1,155 @@
+#include "transport/links.h"
+
+#include "core/parallel.h"
+#include "core/sampling.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using LinkEntry = SparseEntry<LinkValue>;
+using LinkVector = Eigen::Vector4f; // x, y, z and a lane that stays zero
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+LinkVector to_float(const LinkValue& v) {
+    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), 0.0f};
+}
+
+/// What a thread needs to turn samples into the row of a receiver.
+class RowMaker {
+public:
+    RowMaker(const PointHierarchy& points, const PushOperator& push, const SenderRows& rows,
+             int sender_levels)
+        : points_(points), push_(push), rows_(rows), sender_levels_(sender_levels),
+          link_(points.end(sender_levels - 1), LinkVector::Zero()),
+          ancestor_(points.size(), 0.0f) {}
+
+    /// The kept links of receiver i on `level`. `done`: rows of all coarser levels.
+    void make(Index i, int level, std::span<const GatherSample> samples,
+              const std::vector<std::vector<LinkEntry>>& done, float smallest,
+              std::vector<LinkEntry>& kept, std::uint64_t& links_before) {
+        gather(samples);
+        subtract_prediction(i, level, done);
+        threshold(level, smallest, kept, links_before);
+        link_.clear();
+    }
+
+private:
+    /// Raw links: first to sender values, then, by the transpose of push, to sender coefficients.
+    void gather(std::span<const GatherSample> samples) {
+        for (const GatherSample& s : samples) {
+            if (s.patch == no_index) continue;
+            const LinkVector weight(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
+            for (const BasisEntry& entry : rows_.row(s.patch)) link_.at(entry.index) += entry.value * weight;
+        }
+        for (int l = sender_levels_ - 1; l > 0; --l)
+            link_.for_each(points_.begin(l), points_.end(l), [&](std::uint32_t j, const LinkVector& value) {
+                const auto index = push_.parents.indices(j);
+                const auto weight = push_.parents.values(j);
+                for (std::size_t e = 0; e < index.size(); ++e) link_.at(index[e]) += weight[e] * value;
+            });
+    }
+
+    /// Subtracts what the stored rows of all ancestors predict by push.
+    void subtract_prediction(Index i, int level, const std::vector<std::vector<LinkEntry>>& done) {
+        const auto index = push_.parents.indices(i);
+        const auto weight = push_.parents.values(i);
+        for (std::size_t e = 0; e < index.size(); ++e) ancestor_.at(index[e]) += weight[e];
+        for (int l = level - 1; l >= 0; --l)
+            ancestor_.for_each(points_.begin(l), points_.end(l), [&](std::uint32_t k, float share) {
+                for (const LinkEntry& entry : done[k]) link_.at(entry.index) -= share * to_float(entry.value);
+                const auto above = push_.parents.indices(k);
+                const auto part = push_.parents.values(k);
+                for (std::size_t e = 0; e < above.size(); ++e) ancestor_.at(above[e]) += share * part[e];
+            });
+        ancestor_.clear();
+    }
+
+    void threshold(int level, float smallest, std::vector<LinkEntry>& kept, std::uint64_t& links_before) {
+        const std::uint32_t coarsest = points_.end(0), all = points_.end(sender_levels_ - 1);
+        const float smallest2 = smallest * smallest;
+        LinkVector dropped = LinkVector::Zero();
+        float kept_size = 0.0f;
+        link_.for_each(0, coarsest, [&](std::uint32_t, const LinkVector& d) {
+            const float size2 = d.squaredNorm();
+            if (level == 0 || size2 > smallest2)
+                kept_size += std::sqrt(size2);
+            else
+                dropped += d;
+        });
+        if (kept_size > 0.0f) dropped /= kept_size;
+        link_.for_each(0, all, [&](std::uint32_t j, const LinkVector& d) {
+            ++links_before;
+            const float size2 = d.squaredNorm();
+            const bool keep = size2 > smallest2 || (level == 0 && j < coarsest);
+            if (!keep) return;
+            const LinkVector value = j < coarsest ? LinkVector(d + std::sqrt(size2) * dropped) : d;
+            kept.push_back({j, {Eigen::half(value.x()), Eigen::half(value.y()), Eigen::half(value.z())}});
+        });
+    }
+
+    const PointHierarchy& points_;
+    const PushOperator& push_;
+    const SenderRows& rows_;
+    int sender_levels_;
+    Accumulator<LinkVector> link_;
+    Accumulator<float> ancestor_;
+};
+
+} // namespace
+
+Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
+                 SenderRows& rows, int sender_levels, const LinkOptions& options,
+                 LinkStatistics& statistics) {
+    constexpr Index batch = 2048, grain = 64;
+    std::vector<std::vector<LinkEntry>> done(points.size());
+    std::vector<GatherSample> samples;
+    std::vector<std::uint32_t> patches;
+    for (int l = 0; l < points.levels(); ++l) {
+        const GatherDirections directions(l < sender_levels ? options.sender_rays : options.rays,
+                                          hash64(options.seed, static_cast<std::uint64_t>(l)));
+        const float smallest = options.threshold * points.spacing[0] / points.spacing[l];
+        std::vector<std::uint64_t> before(static_cast<std::size_t>(batch / grain));
+        for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
+            const Index end = std::min<Index>(begin + batch, points.end(l));
+            auto start = Clock::now();
+            trace_gather(surface, rows.grid(), points, begin, end, points.begin(l), directions, samples);
+            statistics.trace_seconds += seconds_since(start);
+            statistics.rays += samples.size();
+
+            start = Clock::now();
+            patches.clear();
+            for (const GatherSample& s : samples)
+                if (s.patch != no_index) patches.push_back(s.patch);
+            rows.require(patches);
+            statistics.rows_seconds += seconds_since(start);
+
+            start = Clock::now();
+            std::fill(before.begin(), before.end(), 0);
+            parallel_ranges(end - begin, grain, [&](Index first, Index last) {
+                RowMaker maker(points, push, rows, sender_levels);
+                for (Index r = first; r < last; ++r)
+                    maker.make(begin + r, l,
+                               std::span(samples).subspan(static_cast<std::size_t>(r) * directions.rays(),
+                                                          static_cast<std::size_t>(directions.rays())),
+                               done, smallest, done[begin + r], before[first / grain]);
+            });
+            for (const std::uint64_t b : before) statistics.links_before += b;
+            statistics.links_seconds += seconds_since(start);
+        }
+        statistics.links.push_back(0);
+        for (Index i = points.begin(l); i < points.end(l); ++i) statistics.links.back() += done[i].size();
+    }
+    statistics.patches = rows.made();
+    statistics.uncovered_patches = rows.uncovered();
+    return join_rows(std::move(done));
+}
+
+} // namespace afterglow

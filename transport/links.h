@@ -1,0 +1,45 @@
+#pragma once
+
+#include "basis/point_hierarchy.h"
+#include "basis/push.h"
+#include "transport/gather.h"
+
+#include <Eigen/Core>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace afterglow {
+
+/// One link T_ij: the vector irradiance at receiver i that one unit of radiosity coefficient of
+/// sender j makes, less what the coarser receivers predict [LZT08, eqs. (16), (17); with the 1/pi
+/// that radiance B/pi brings]. No cosine, no reflectance inside; without a unit.
+using LinkValue = std::array<Eigen::half, 3>;
+
+/// All links: a row a receiver, columns are senders.
+using Links = SparseRows<LinkValue>;
+
+struct LinkOptions {
+    int rays = 512;            // of a receiver on the finest level; a power of two
+    int sender_rays = 1024;    // of a receiver that is a sender point as well
+    /// A link d is kept where |d| R_l / R_0 > threshold (R_l: spacing of the receiver's level). What
+    /// is dropped of the coarsest senders goes onto those that stay, so that the response to uniform
+    /// light stays exact.
+    float threshold = 1e-3f;
+    std::uint64_t seed = 1;
+};
+
+struct LinkStatistics {
+    std::uint64_t rays = 0, links_before = 0;
+    std::vector<std::uint64_t> links; // a receiver level
+    double trace_seconds = 0.0, rows_seconds = 0.0, links_seconds = 0.0;
+    std::uint64_t patches = 0, uncovered_patches = 0;
+};
+
+/// Gathers, differences and thresholds the links of every receiver, level by level.
+Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
+                 SenderRows& rows, int sender_levels, const LinkOptions& options,
+                 LinkStatistics& statistics);
+
+} // namespace afterglow

@@ -1,0 +1,77 @@
+#include "transport/precompute.h"
+
+#include "core/error.h"
+
+#include <bit>
+#include <chrono>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// The finest sender spacing as a share of the typical ray length; the coarsest level follows.
+constexpr float finest_sender_share = 0.04f;
+
+void check(const PrecomputeOptions& options) {
+    if (options.receiver_levels < 1 || options.receiver_levels > 10)
+        throw UsageError("--receiver-levels must lie between 1 and 10");
+    if (options.sender_levels < 1 || options.sender_levels > options.receiver_levels)
+        throw UsageError("--sender-levels must lie between 1 and the number of receiver levels ("
+                         + std::to_string(options.receiver_levels) + ")");
+    if (!(options.coarse_radius >= 0.0f) || !std::isfinite(options.coarse_radius))
+        throw UsageError("--coarse-radius must be positive");
+    for (const int rays : {options.links.rays, options.links.sender_rays})
+        if (rays < 16 || rays > 32768 || !std::has_single_bit(static_cast<unsigned>(rays)))
+            throw UsageError("--rays must be a power of two between 16 and 32768");
+}
+
+} // namespace
+
+TransferOperator precompute(const Surface& surface, const PrecomputeOptions& options,
+                            PrecomputeReport* report) {
+    check(options);
+    PrecomputeReport local;
+    PrecomputeReport& r = report ? *report : local;
+    const auto start = Clock::now();
+
+    r.viewpoints = options.viewpoint ? std::vector<Vec3>{*options.viewpoint}
+                                     : find_viewpoints(surface, options.seed);
+    CandidateSource source(surface, r.viewpoints, options.seed);
+    r.mean_ray_length = source.mean_ray_length();
+
+    TransferOperator transfer;
+    transfer.sender_levels = options.sender_levels;
+    HierarchyOptions hierarchy;
+    hierarchy.coarse_radius
+        = options.coarse_radius > 0.0f
+              ? options.coarse_radius
+              : std::ldexp(finest_sender_share * static_cast<float>(r.mean_ray_length), 3);
+    hierarchy.levels = options.receiver_levels;
+    hierarchy.shape = options.shape;
+    hierarchy.openness_density = options.receiver_levels > options.sender_levels ? options.openness_density : 0.0f;
+    hierarchy.seed = options.seed;
+    transfer.points = build_hierarchy(source, hierarchy, &r.hierarchy);
+    r.points_seconds = seconds_since(start);
+    r.points_rays = source.rays();
+
+    const auto push_start = Clock::now();
+    const ShepardBasis basis(transfer.points, surface, options.see_walls);
+    transfer.push = make_push_operator(basis);
+    r.push_seconds = seconds_since(push_start);
+
+    const float patch_size = 0.5f * transfer.points.spacing[options.sender_levels - 1];
+    SenderRows rows(surface, basis, options.sender_levels, patch_size);
+    LinkOptions links = options.links;
+    links.seed = options.seed;
+    transfer.links = make_links(surface, transfer.points, transfer.push, rows, options.sender_levels, links, r.links);
+    r.total_seconds = seconds_since(start);
+    return transfer;
+}
+
+} // namespace afterglow

@@ -1,0 +1,42 @@
+#pragma once
+
+#include "basis/point_hierarchy.h"
+#include "core/surface.h"
+#include "transport/transfer_operator.h"
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace afterglow {
+
+struct PrecomputeOptions {
+    std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
+    float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length
+    int receiver_levels = 5;
+    int sender_levels = 4;         // the first of the receivers' levels
+    LinkOptions links;
+    BasisShape shape;
+    float openness_density = 0.1f; // of the finest receivers, see PoissonDiskOptions
+    bool see_walls = true;
+    std::uint64_t seed = 1;
+};
+
+/// Wall-clock seconds and counts of each stage, for --report.
+struct PrecomputeReport {
+    double points_seconds = 0.0, push_seconds = 0.0;
+    std::vector<Vec3> viewpoints;
+    double mean_ray_length = 0.0;
+    HierarchyStatistics hierarchy;
+    std::uint64_t points_rays = 0;
+    LinkStatistics links;
+    double total_seconds = 0.0;
+};
+
+/// From a scene to its transfer operator. Throws UsageError for impossible options.
+TransferOperator precompute(const Surface& surface, const PrecomputeOptions& options,
+                            PrecomputeReport* report = nullptr);
+
+} // namespace afterglow

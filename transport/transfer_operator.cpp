@@ -1,0 +1,97 @@
+#include "transport/transfer_operator.h"
+
+#include "core/parallel.h"
+#include "transport/krylov.h"
+
+#include <algorithm>
+
+namespace afterglow {
+
+LightTransport::LightTransport(const TransferOperator& transfer)
+    : transfer_(transfer), pull_(transfer.points, transfer.push, transfer.sender_levels) {}
+
+Radiosity LightTransport::direct_radiosity(const Surface& surface, const Spotlight& light) const {
+    const PointHierarchy& points = transfer_.points;
+    Radiosity radiosity(3 * static_cast<std::size_t>(transfer_.senders()));
+    parallel_for(
+        transfer_.senders(),
+        [&](Index m) {
+            const Rgb e = direct_irradiance(surface, light, points.point(m));
+            Rgb::Map(&radiosity[3 * m]) = points.reflectance.col(m).array() * e;
+        },
+        256);
+    return radiosity;
+}
+
+std::vector<float> LightTransport::coefficients(const Radiosity& radiosity) const {
+    const PointHierarchy& points = transfer_.points;
+    std::vector<float> values(radiosity);
+    pull_.pull(points, 3, values);
+    transfer_.push.difference(points, transfer_.sender_levels, 3, values);
+    std::vector<float> padded(4 * static_cast<std::size_t>(transfer_.senders()), 0.0f);
+    for (std::size_t m = 0; m < transfer_.senders(); ++m) std::copy_n(&values[3 * m], 3, &padded[4 * m]);
+    return padded;
+}
+
+VectorIrradiance LightTransport::apply_links(const std::vector<float>& coefficients, int levels) const {
+    const PointHierarchy& points = transfer_.points;
+    const Index receivers = points.end(levels - 1);
+    VectorIrradiance field(9 * static_cast<std::size_t>(receivers));
+    parallel_for(
+        receivers,
+        [&](Index i) {
+            using Eigen::Vector4f;
+            Vector4f x = Vector4f::Zero(), y = Vector4f::Zero(), z = Vector4f::Zero();
+            const auto sender = transfer_.links.indices(i);
+            const auto value = transfer_.links.values(i);
+            for (std::size_t k = 0; k < sender.size(); ++k) {
+                const auto e = Vector4f::Map(&coefficients[4 * static_cast<std::size_t>(sender[k])]);
+                x += static_cast<float>(value[k][0]) * e;
+                y += static_cast<float>(value[k][1]) * e;
+                z += static_cast<float>(value[k][2]) * e;
+            }
+            float* to = &field[9 * static_cast<std::size_t>(i)];
+            std::copy_n(x.data(), 3, to);
+            std::copy_n(y.data(), 3, to + 3);
+            std::copy_n(z.data(), 3, to + 6);
+        },
+        256);
+    transfer_.push.push(points, levels, 9, field);
+    return field;
+}
+
+Radiosity LightTransport::bounce(const Radiosity& radiosity) const {
+    const PointHierarchy& points = transfer_.points;
+    const VectorIrradiance field = apply_links(coefficients(radiosity), transfer_.sender_levels);
+    Radiosity next(radiosity.size());
+    parallel_for(
+        transfer_.senders(),
+        [&](Index m) {
+            const Vec3 n = points.normal.col(m);
+            const float* v = &field[9 * m];
+            for (int c = 0; c < 3; ++c)
+                next[3 * m + c] = points.reflectance(c, m)
+                                  * (n.x() * v[c] + n.y() * v[3 + c] + n.z() * v[6 + c]);
+        },
+        1024);
+    return next;
+}
+
+Radiosity LightTransport::all_bounces(const Radiosity& direct, double tolerance,
+                                      NeumannStatistics* statistics) const {
+    const KrylovResult result = solve_second_kind(
+        [&](const std::vector<float>& f) { return bounce(f); }, direct, 3, tolerance);
+    if (statistics) *statistics = {result.products, result.residual};
+    return result.solution;
+}
+
+VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
+    return apply_links(coefficients(radiosity), transfer_.points.levels());
+}
+
+VectorIrradiance LightTransport::indirect(const Surface& surface, const Spotlight& light,
+                                          NeumannStatistics* statistics) const {
+    return gather(all_bounces(direct_radiosity(surface, light), 2e-3, statistics));
+}
+
+} // namespace afterglow

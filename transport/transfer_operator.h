@@ -1,0 +1,75 @@
+#pragma once
+
+#include "basis/point_hierarchy.h"
+#include "basis/push.h"
+#include "core/surface.h"
+#include "transport/links.h"
+#include "transport/spotlight.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace afterglow {
+
+/// All that a transfer file holds: the basis and the one-bounce operator over it. Senders are the
+/// points of the first `sender_levels` levels, receivers are all.
+struct TransferOperator {
+    PointHierarchy points;
+    int sender_levels = 0;
+    PushOperator push;
+    Links links;
+
+    std::uint32_t senders() const { return points.end(sender_levels - 1); }
+    int display_level() const { return points.levels() - 1; }
+};
+
+/// Three numbers (R, G, B) a sender point: its radiosity [W/m^2].
+using Radiosity = std::vector<float>;
+/// Nine numbers a point, component of space times colour: x.R, x.G, x.B, y.R ... [W/m^2]; the
+/// irradiance of a surface with normal n is max(0, n . V) per colour.
+using VectorIrradiance = std::vector<float>;
+
+struct NeumannStatistics {
+    int products = 0;      // applications of the bounce operator
+    double residual = 0.0; // relative to the first bounce
+};
+
+/// The operator at work: direct light in, indirect vector irradiance out.
+class LightTransport {
+public:
+    /// Keeps a reference to `transfer`, which must outlive it.
+    explicit LightTransport(const TransferOperator& transfer);
+
+    const TransferOperator& transfer() const { return transfer_; }
+
+    /// Radiosity rho E of the sender points by direct light; one shadow ray where the cone reaches.
+    Radiosity direct_radiosity(const Surface& surface, const Spotlight& light) const;
+
+    /// One bounce: radiosity of the sender points by light that left them, M f = rho n . push(T e)
+    /// with e the coefficients of f.
+    Radiosity bounce(const Radiosity& radiosity) const;
+
+    /// The sum of all bounces, (I - M)^-1 f = f + M f + M^2 f + ...: the Neumann series accelerated
+    /// by minimal residuals over its Krylov space (GMRES, Saad and Schultz 1986), each colour by
+    /// itself; ends when the residual is below `tolerance` times the first bounce.
+    Radiosity all_bounces(const Radiosity& direct, double tolerance = 2e-3,
+                          NeumannStatistics* statistics = nullptr) const;
+
+    /// T e pushed to every receiver: indirect vector irradiance at all points.
+    VectorIrradiance gather(const Radiosity& radiosity) const;
+
+    /// Indirect vector irradiance at all points under a light, all bounces.
+    VectorIrradiance indirect(const Surface& surface, const Spotlight& light,
+                              NeumannStatistics* statistics = nullptr) const;
+
+private:
+    const TransferOperator& transfer_;
+    PullOperator pull_;
+
+    /// Pulled and differenced, four floats a sender (the last zero).
+    std::vector<float> coefficients(const Radiosity& radiosity) const;
+    VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
+};
+
+} // namespace afterglow
