@@ -50,16 +50,21 @@ Vec2 scrambled_sobol2(std::uint32_t index, std::uint64_t seed) {
 
 Vec2 shuffled_sobol2(std::uint32_t index, std::uint64_t seed) {
     const auto order = static_cast<std::uint32_t>(hash64(seed, 0x5bf03635u));
-    return scrambled_sobol2(reverse_bits(owen_scramble(reverse_bits(index), order)), seed);
+    // Scrambled as a fraction, an index keeps its aligned block of 2^k together, hence stratified.
+    return scrambled_sobol2(owen_scramble(index, order), seed);
 }
 
-Vec3 sample_cosine(const Vec2& u) { return from_polar(std::sqrt(1.0f - u.x()), two_pi * u.y()); }
+Vec3 sample_cosine(const Vec2& u) {
+    return from_polar(std::sqrt(1.0f - u.x()), two_pi * u.y());
+}
 
 Vec3 sample_vector_irradiance(const Vec2& u) {
     // The distribution function of c = cos(theta) is (c^2 + c) / 2; 1 - u keeps c > 0.
     return from_polar(0.5f * (-1.0f + std::sqrt(1.0f + 8.0f * (1.0f - u.x()))), two_pi * u.y());
 }
 
-Vec3 sample_sphere(const Vec2& u) { return from_polar(1.0f - 2.0f * u.x(), two_pi * u.y()); }
+Vec3 sample_sphere(const Vec2& u) {
+    return from_polar(1.0f - 2.0f * u.x(), two_pi * u.y());
+}
 
 } // namespace afterglow

@@ -1,0 +1,124 @@
+#include "core/error.h"
+#include "core/file.h"
+#include "tests/core/temporary_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstring>
+#include <sys/resource.h>
+
+namespace afterglow {
+namespace {
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+    return std::as_bytes(std::span(text));
+}
+
+void write_text(const std::string& path, const std::string& text) {
+    write_atomically(path,
+                     [&](const std::string& temporary) { write_bytes(temporary, bytes_of(text)); });
+}
+
+/// Files of this process may not grow beyond some bytes, as if the disk were full.
+class FullDisk {
+public:
+    explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+        getrlimit(RLIMIT_FSIZE, &before_);
+        rlimit limit = before_;
+        limit.rlim_cur = bytes;
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ~FullDisk() {
+        setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+
+private:
+    rlimit before_{};
+    void (*handler_)(int);
+};
+
+TEST(WriteAtomically, ReplacesAFileAndLeavesNothingElse) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a.txt", "old");
+    write_text(path, "new");
+    EXPECT_EQ(content_of(path), "new");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(WriteAtomically, KeepsTheOldFileWhereTheWriterThrows) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a.txt", "old");
+    EXPECT_THROW(write_atomically(path,
+                                  [](const std::string& temporary) {
+                                      std::ofstream(temporary) << "half of it";
+                                      throw std::runtime_error("out of ideas");
+                                  }),
+                 std::runtime_error);
+    EXPECT_EQ(content_of(path), "old");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(WriteAtomically, KeepsTheOldFileWhereTheDiskIsFull) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a.txt", "old");
+    {
+        const FullDisk disk(1000);
+        EXPECT_THROW(write_text(path, std::string(5000, 'x')), FileError);
+    }
+    EXPECT_EQ(content_of(path), "old");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(WriteAtomically, TellsOfAFullDeviceAndDoesNotReplaceIt) {
+    if (!std::filesystem::is_character_file("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+    EXPECT_THROW(write_text("/dev/full", "text"), FileError);
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+}
+
+TEST(WriteAtomically, WritesThroughASymbolicLink) {
+    const TemporaryFolder folder;
+    const std::string target = folder.write("target.txt", "old"), link = folder.path("link.txt");
+    std::filesystem::create_symlink(target, link);
+    write_text(link, "new");
+    EXPECT_TRUE(std::filesystem::is_symlink(link));
+    EXPECT_EQ(content_of(target), "new");
+}
+
+TEST(WriteAtomically, RefusesAFolderAndAMissingFolder) {
+    const TemporaryFolder folder;
+    EXPECT_THROW(write_text(folder.path(""), "text"), FileError);
+    EXPECT_THROW(write_text(folder.path("none/a.txt"), "text"), FileError);
+    EXPECT_THROW(write_atomically(folder.path("b.txt"), [](const std::string&) {}), FileError);
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST(MappedFile, ShowsTheBytesOfAFile) {
+    const TemporaryFolder folder;
+    const std::string text("a\0b\n", 4);
+    const MappedFile file(folder.write("a.bin", text));
+    ASSERT_EQ(file.bytes().size(), text.size());
+    EXPECT_EQ(std::memcmp(file.bytes().data(), text.data(), text.size()), 0);
+}
+
+TEST(MappedFile, OfAnEmptyFileIsEmpty) {
+    const TemporaryFolder folder;
+    EXPECT_TRUE(MappedFile(folder.write("empty", "")).bytes().empty());
+}
+
+TEST(MappedFile, RefusesWhatIsNoFile) {
+    const TemporaryFolder folder;
+    EXPECT_THROW(MappedFile(folder.path("none")), FileError);
+    EXPECT_THROW(MappedFile(folder.path("")), FileError);
+    EXPECT_THROW(MappedFile("/dev/null"), FileError);
+}
+
+TEST(HashHex, IsTheCanonicalXxh3Of128Bits) {
+    // Published test value: XXH3 128 bits of no bytes, seed 0.
+    EXPECT_EQ(hash_hex({}), "99aa06d3014798d86001c324468d497f");
+    EXPECT_NE(hash_hex(bytes_of("a")), hash_hex(bytes_of("b")));
+}
+
+} // namespace
+} // namespace afterglow
