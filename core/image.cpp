@@ -23,8 +23,9 @@ namespace afterglow {
 namespace {
 
 constexpr const char* channel_names[3] = {"R", "G", "B"};
-constexpr std::int64_t most_pixels = std::int64_t{1}
-                                     << 27; // a damaged header must not ask for more
+// What a damaged header may ask for at most.
+constexpr std::int64_t most_pixels = std::int64_t{1} << 27, longest_side = 1 << 16;
+<< 27; // a damaged header must not ask for more
 
 std::size_t pixel_count(const Image& image) {
     return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
@@ -168,7 +169,8 @@ Image read_exr(const std::string& path) {
         const Imath::Box2i window = header.dataWindow();
         const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
         const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-        if (width < 1 || height < 1 || width > most_pixels / height)
+        if (width < 1 || height < 1 || width > longest_side || height > longest_side
+            || width * height > most_pixels)
             throw FileError(path, "has an impossible size of " + std::to_string(width) + "x"
                                       + std::to_string(height) + " pixels");
         for (const char* name : channel_names) {

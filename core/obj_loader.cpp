@@ -24,9 +24,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float largest_coordinate = 1e18f;      // Embree's limit; cross products still fit a float
-constexpr float largest_reflectance = 0.999f;    // at one, light would bounce forever
-constexpr std::size_t most_indices = 0x7fffffff; // tinyobjloader reads indices as int
+constexpr float largest_coordinate = 1e18f;   // Embree's limit; cross products still fit a float
+constexpr float largest_reflectance = 0.999f; // at one, light would bounce forever
+constexpr std::size_t index_digits = 9;       // tinyobjloader reads indices as int
+constexpr std::size_t most_indices = 999'999'999;
 constexpr int most_texels = 1 << 26;
 
 // ---- Text
@@ -41,7 +42,8 @@ std::string_view trimmed(std::string_view text) {
 /// Hands the mapped file to tinyobjloader line by line. tinyobjloader reads what is no number
 /// ("nan",
 /// "-inf", "1.#IND") as a plausible zero; here it becomes 1e999, hence infinite, and the triangles
-/// that use it can be told.
+/// that use it can be told. Likewise an index of ten digits or more, which might come out as a
+/// small one, becomes 0, which is no index.
 class LineBuffer : public std::streambuf {
 public:
     explicit LineBuffer(std::string_view text) : rest_(text) {}
@@ -61,6 +63,9 @@ private:
         std::string_view shown = line_;
         if (has_odd_number(line_)) {
             rewritten_ = with_infinities(line_);
+            shown = rewritten_;
+        } else if (has_absurd_index(line_)) {
+            rewritten_ = without_absurd_indices(line_);
             shown = rewritten_;
         }
         char* begin = const_cast<char*>(shown.data()); // the base class reads only
@@ -99,6 +104,28 @@ private:
             const bool is_number = std::all_of(token.begin(), token.end(), is_number_character);
             result += is_number ? token : std::string_view("1e999");
             if (i < line.size()) result += line[i++];
+        }
+        return result;
+    }
+
+    static bool is_digit(char c) { return c >= '0' && c <= '9'; }
+    static bool has_absurd_index(std::string_view line) {
+        const std::size_t start = line.find_first_not_of(" \t");
+        if (start == std::string_view::npos || line[start] != 'f') return false;
+        std::size_t run = 0;
+        for (const char c : line)
+            if ((run = is_digit(c) ? run + 1 : 0) > index_digits) return true;
+        return false;
+    }
+    static std::string without_absurd_indices(std::string_view line) {
+        std::string result;
+        for (std::size_t i = 0; i < line.size();) {
+            std::size_t end = i;
+            while (end < line.size() && is_digit(line[end]))
+                ++end;
+            if (end == i) ++end; // a single character that is no digit
+            result += end - i > index_digits ? "0" : line.substr(i, end - i);
+            i = end;
         }
         return result;
     }

@@ -1,0 +1,237 @@
+#include "core/builtin_scenes.h"
+#include "core/parallel.h"
+#include "core/sampling.h"
+#include "core/surface.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+namespace afterglow {
+namespace {
+
+using Vec3d = Eigen::Vector3d;
+
+Vec3 random_point(Rng& rng) {
+    const float x = rng.uniform(), y = rng.uniform(), z = rng.uniform();
+    return {2.0f * x - 1.0f, 2.0f * y - 1.0f, 2.0f * z - 1.0f};
+}
+
+Vec3 random_direction(Rng& rng) {
+    const float u = rng.uniform(), v = rng.uniform();
+    return sample_sphere({u, v});
+}
+
+/// Small triangles strewn in the box [-1, 1]^3, half of them with vertex normals.
+Scene triangle_soup(int count) {
+    Scene scene;
+    Rng rng(3, 0);
+    scene.materials.push_back({"a", {0.1f, 0.2f, 0.3f}, no_index});
+    scene.materials.push_back({"b", {0.4f, 0.5f, 0.6f}, no_index});
+    for (int i = 0; i < count; ++i) {
+        const Vec3 centre = random_point(rng);
+        const auto first = static_cast<std::uint32_t>(scene.positions.size());
+        for (int k = 0; k < 3; ++k)
+            scene.positions.push_back(centre + 0.2f * random_point(rng));
+        const Triangle triangle{first, first + 1, first + 2};
+        scene.triangles.push_back(triangle);
+        scene.material_index.push_back(static_cast<std::uint32_t>(i % 2));
+        for (int k = 0; k < 3; ++k)
+            scene.normals.push_back(random_direction(rng));
+        scene.normal_indices.push_back(i % 2 ? triangle : Triangle{no_index, no_index, no_index});
+    }
+    return scene;
+}
+
+/// The oracle: Moeller and Trumbore's test on every triangle, in double precision. `margin` becomes
+/// small where some ray-triangle test is a close call.
+struct Answer {
+    double distance = std::numeric_limits<double>::infinity(), second = distance;
+    std::uint32_t primitive = no_index;
+    double margin = 1.0;
+};
+Answer brute_force(const Scene& scene, const Ray& ray) {
+    Answer answer;
+    const Vec3d o = ray.origin.cast<double>(), d = ray.direction.cast<double>();
+    for (std::uint32_t i = 0; i < scene.triangles.size(); ++i) {
+        const Triangle& t = scene.triangles[i];
+        const Vec3d a = scene.positions[t[0]].cast<double>();
+        const Vec3d ab = scene.positions[t[1]].cast<double>() - a;
+        const Vec3d ac = scene.positions[t[2]].cast<double>() - a;
+        const Vec3d p = d.cross(ac);
+        const double determinant = ab.dot(p);
+        const Vec3d s = o - a, q = s.cross(ab);
+        const double u = s.dot(p) / determinant, v = d.dot(q) / determinant;
+        const double distance = ac.dot(q) / determinant;
+        const double inside = std::min({u, v, 1.0 - u - v});
+        if (distance > -1e-4 && std::abs(distance) < 1e3)
+            answer.margin = std::min({answer.margin, std::abs(inside), std::abs(distance)});
+        if (inside < 0.0 || !(distance > 0.0)) continue;
+        if (distance < answer.distance) {
+            answer.second = answer.distance;
+            answer.distance = distance;
+            answer.primitive = i;
+        } else {
+            answer.second = std::min(answer.second, distance);
+        }
+    }
+    return answer;
+}
+
+std::vector<Ray> random_rays(int count, std::uint64_t seed) {
+    Rng rng(seed, 0);
+    std::vector<Ray> rays;
+    for (int i = 0; i < count; ++i) {
+        const Vec3 origin = random_point(rng);
+        rays.push_back({origin, random_direction(rng)});
+    }
+    return rays;
+}
+
+TEST(Surface, MeetsWhatBruteForceMeets) {
+    const Scene scene = triangle_soup(300);
+    const Surface surface(scene);
+    int compared = 0, hits = 0;
+    for (const Ray& ray : random_rays(5000, 4)) {
+        const Answer answer = brute_force(scene, ray);
+        // Close calls (an edge, two surfaces at one depth) may fall either way in single precision.
+        if (answer.margin < 1e-4 || answer.second - answer.distance < 1e-4) continue;
+        ++compared;
+        const Hit hit = surface.closest_hit(ray);
+        ASSERT_EQ(hit.primitive, answer.primitive);
+        EXPECT_EQ(surface.occluded(ray), bool(hit));
+        if (!hit) continue;
+        ++hits;
+        EXPECT_NEAR(hit.distance, answer.distance, 1e-4);
+        const Vec3 place = ray.origin + hit.distance * ray.direction;
+        EXPECT_LT((surface.point(hit).position - place).norm(), 1e-5f);
+    }
+    EXPECT_GT(compared, 4000);
+    EXPECT_GT(hits, 1000);
+}
+
+TEST(Surface, IsOccludedOnlyBeforeTheEndOfTheRay) {
+    const Scene scene = triangle_soup(300);
+    const Surface surface(scene);
+    int hits = 0;
+    for (Ray ray : random_rays(2000, 5)) {
+        const Hit hit = surface.closest_hit(ray);
+        if (!hit || hit.distance < 1e-3f) continue;
+        ++hits;
+        ray.length = 0.999f * hit.distance;
+        EXPECT_FALSE(surface.occluded(ray));
+        EXPECT_FALSE(surface.closest_hit(ray));
+        EXPECT_FALSE(surface.blocked(ray.origin, ray.origin + ray.length * ray.direction));
+        ray.length = 1.001f * hit.distance;
+        EXPECT_TRUE(surface.occluded(ray));
+        EXPECT_TRUE(surface.blocked(ray.origin, ray.origin + ray.length * ray.direction));
+    }
+    EXPECT_GT(hits, 500);
+}
+
+TEST(Surface, AnswersPacketsLikeSingleRays) {
+    const Scene scene = triangle_soup(300);
+    const Surface surface(scene);
+    for (const int count : {0, 1, 7, 8, 9, 1001}) {
+        const std::vector<Ray> rays = random_rays(count, 6);
+        std::vector<Hit> hits(rays.size());
+        surface.closest_hits(rays, hits);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const Hit single = surface.closest_hit(rays[i]);
+            ASSERT_EQ(hits[i].primitive, single.primitive);
+            if (!single) continue;
+            EXPECT_NEAR(hits[i].distance, single.distance, 1e-5f);
+            EXPECT_EQ(hits[i].back_side, single.back_side);
+        }
+    }
+}
+
+TEST(Surface, TurnsItsNormalsToTheViewer) {
+    const Scene scene = triangle_soup(300);
+    const Surface surface(scene);
+    int fronts = 0, backs = 0;
+    for (const Ray& ray : random_rays(5000, 7)) {
+        const Hit hit = surface.closest_hit(ray);
+        if (!hit) continue;
+        ++(hit.back_side ? backs : fronts);
+        const Vec3 geometric = surface.geometric_normal(hit), shading = surface.point(hit).normal;
+        EXPECT_LT(geometric.dot(ray.direction), 1e-5f);
+        EXPECT_NEAR(geometric.norm(), 1.0f, 1e-5f);
+        EXPECT_NEAR(shading.norm(), 1.0f, 1e-5f);
+        EXPECT_GT(shading.dot(geometric), 0.0f);
+        if (scene.normal_indices[hit.primitive][0] == no_index) {
+            EXPECT_EQ(shading, geometric);
+        }
+    }
+    EXPECT_GT(fronts, 500);
+    EXPECT_GT(backs, 500);
+}
+
+TEST(Surface, InterpolatesVertexNormals) {
+    Scene scene;
+    scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    scene.triangles = {{0, 1, 2}};
+    scene.material_index = {0};
+    scene.materials = {{}};
+    scene.normals = {Vec3(0, 0, 1), Vec3(0.6f, 0, 0.8f)};
+    scene.normal_indices = {{0, 1, 0}};
+    const Surface surface(scene);
+    const Hit hit = surface.closest_hit({{0.25f, 0.25f, 1}, -Vec3::UnitZ()});
+    ASSERT_TRUE(hit);
+    const Vec3 expected = Vec3(0.25f * 0.6f, 0, 0.75f + 0.25f * 0.8f).normalized();
+    EXPECT_LT((surface.point(hit).normal - expected).norm(), 1e-5f);
+    const Hit back = surface.closest_hit({{0.25f, 0.25f, -1}, Vec3::UnitZ()});
+    EXPECT_TRUE(back.back_side);
+    EXPECT_LT((surface.point(back).normal + expected).norm(), 1e-5f);
+}
+
+TEST(Surface, MultipliesReflectanceByTheTexture) {
+    Scene scene;
+    scene.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    scene.triangles = {{0, 1, 2}, {0, 2, 3}};
+    scene.material_index = {0, 0};
+    scene.materials = {{"picture", Rgb::Constant(0.5f), 0}};
+    scene.texture_coordinates = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    scene.texture_indices = {{0, 1, 2}, {no_index, no_index, no_index}};
+    scene.textures = {{2, 1, {1, 0, 0, 0, 1, 0}}}; // red, green
+    const Surface surface(scene);
+    const auto seen_at = [&](float x, float y) {
+        return surface.reflectance(surface.closest_hit({{x, y, 1}, -Vec3::UnitZ()}));
+    };
+    EXPECT_LT((seen_at(0.25f, 0.1f) - Rgb(0.5f, 0, 0)).abs().maxCoeff(), 1e-5f);
+    EXPECT_LT((seen_at(0.75f, 0.1f) - Rgb(0, 0.5f, 0)).abs().maxCoeff(), 1e-5f);
+    EXPECT_LT((seen_at(0.25f, 0.9f) - Rgb::Constant(0.5f)).abs().maxCoeff(), 1e-5f);
+}
+
+TEST(Surface, LetsNoRayEscapeFromClosedScenes) {
+    // Half of the rays start in the air, half on the surface, lifted off it.
+    for (const char* name : {"builtin:furnace", "builtin:sphere:0.5", "builtin:two_rooms"}) {
+        const Scene scene = make_builtin_scene(name);
+        const Surface surface(scene);
+        std::atomic<int> escaped{0};
+        parallel_for(500'000, [&](Index i) {
+            Rng rng(9, static_cast<std::uint64_t>(i));
+            const Hit first = surface.closest_hit({*scene.viewpoint, random_direction(rng)});
+            if (!first) {
+                ++escaped;
+                return;
+            }
+            const SurfacePoint x = surface.point(first);
+            const float u = rng.uniform(), v = rng.uniform();
+            const Vec3 onwards = Frame(x.normal).to_world(sample_cosine({u, v}));
+            if (!surface.closest_hit({surface.lifted(x), onwards})) ++escaped;
+        });
+        EXPECT_EQ(escaped, 0) << name;
+    }
+}
+
+TEST(Surface, OfAnEmptySceneIsNeverMet) {
+    const Scene scene;
+    const Surface surface(scene);
+    EXPECT_FALSE(surface.closest_hit({Vec3::Zero(), Vec3::UnitX()}));
+    EXPECT_FALSE(surface.occluded({Vec3::Zero(), Vec3::UnitX()}));
+}
+
+} // namespace
+} // namespace afterglow
