@@ -25,7 +25,6 @@ namespace {
 constexpr const char* channel_names[3] = {"R", "G", "B"};
 // What a damaged header may ask for at most.
 constexpr std::int64_t most_pixels = std::int64_t{1} << 27, longest_side = 1 << 16;
-<< 27; // a damaged header must not ask for more
 
 std::size_t pixel_count(const Image& image) {
     return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
