@@ -9,13 +9,13 @@ namespace afterglow {
 /// intensity * falloff(angle) [W/sr].
 struct Spotlight {
     Vec3 position = Vec3::Zero();
-    Vec3 direction = -Vec3::UnitY();           // unit length
-    float inner_angle = 0.0f;                  // half-angle of full intensity [degrees]
-    float outer_angle = 45.0f;                 // half-angle where it ends [degrees]; equal to inner: hard
-    Rgb intensity = Rgb::Ones();               // W/sr on the axis
+    Vec3 direction = -Vec3::UnitY(); // unit length
+    float inner_angle = 0.0f;        // half-angle of full intensity [degrees]
+    float outer_angle = 45.0f;       // half-angle where it ends [degrees]; equal to inner: hard
+    Rgb intensity = Rgb::Ones();     // W/sr on the axis
 
-    /// Normalises the direction. Throws UsageError unless 0 <= inner <= outer <= 180, outer > 0, the
-    /// direction is not zero and everything is finite (intensity also not negative).
+    /// Normalises the direction. Throws UsageError unless 0 <= inner <= outer <= 180, outer > 0,
+    /// the direction is not zero and everything is finite (intensity also not negative).
     void check();
     /// Share of the intensity sent at the cosine c of the angle from the axis, in [0, 1].
     float falloff(float c) const;
@@ -24,7 +24,8 @@ struct Spotlight {
 /// E(x) = I falloff cos(theta) / r^2 without visibility [W/m^2], zero where the surface faces away.
 Rgb unoccluded_irradiance(const Spotlight& light, const SurfacePoint& x);
 
-/// The same times visibility: one shadow ray where it is not zero already. Reflectance not included.
+/// The same times visibility: one shadow ray where it is not zero already. Reflectance not
+/// included.
 Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const SurfacePoint& x);
 
 } // namespace afterglow

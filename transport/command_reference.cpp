@@ -1,0 +1,173 @@
+#include "transport/command_reference.h"
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "transport/cli_options.h"
+#include "transport/csv_points.h"
+#include "transport/path_tracer.h"
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+
+namespace afterglow {
+namespace {
+
+struct ReferenceCommand {
+    std::string scene, output, points, layer = "indirect", report;
+    Spotlight light;
+    Camera camera;
+    Index samples = 256;
+    double target_error = 0.0;
+    RunOptions run;
+};
+
+/// What a run achieved, whatever it made.
+struct Achieved {
+    double relative_error = 0.0, seconds = 0.0;
+    std::uint64_t samples = 0, rays = 0;
+};
+
+std::string number_text(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
+}
+
+std::string vector_text(const Eigen::Ref<const Vec3>& v) {
+    return number_text(v.x()) + "," + number_text(v.y()) + "," + number_text(v.z());
+}
+
+std::map<std::string, std::string> provenance(const ReferenceCommand& command, const Scene& scene,
+                                              const Achieved& achieved) {
+    const Spotlight& light = command.light;
+    return {{"afterglow.version", AFTERGLOW_VERSION},
+            {"afterglow.algorithm", "path tracing"},
+            {"afterglow.scene", scene.name},
+            {"afterglow.scene_hash", scene.content_hash()},
+            {"afterglow.seed", std::to_string(command.run.seed)},
+            {"afterglow.layer", command.points.empty() ? command.layer : "irradiance"},
+            {"afterglow.light_position", vector_text(light.position)},
+            {"afterglow.light_direction", vector_text(light.direction)},
+            {"afterglow.light_cone",
+             number_text(light.inner_angle) + "," + number_text(light.outer_angle)},
+            {"afterglow.light_intensity", vector_text(light.intensity.matrix())},
+            {"afterglow.samples", std::to_string(achieved.samples)},
+            {"afterglow.relative_standard_error", number_text(achieved.relative_error)}};
+}
+
+void write_report(const std::string& path, const ReferenceCommand& command, const Scene& scene,
+                  const Achieved& achieved) {
+    nlohmann::json report;
+    for (const auto& [name, value] : provenance(command, scene, achieved))
+        report[name.substr(name.find('.') + 1)] = value;
+    report["relative_standard_error"] = achieved.relative_error;
+    report["samples"] = achieved.samples;
+    report["rays"] = achieved.rays;
+    report["seconds"] = achieved.seconds;
+    report["rays_per_second"] = static_cast<double>(achieved.rays) / achieved.seconds;
+    write_atomically(path, [&](const std::string& temporary) {
+        std::ofstream file(temporary);
+        file << report.dump(1) << '\n';
+        file.close();
+        if (!file) throw FileError(path, "cannot be written");
+    });
+}
+
+Achieved trace_points(const ReferenceCommand& command, const Surface& surface,
+                      const PathTracerOptions& options) {
+    const std::vector<SurfacePoint> points = read_points_csv(command.points);
+    const IrradianceEstimate estimate =
+        estimate_irradiance(surface, {&command.light, 1}, points, options);
+    write_irradiance_csv(command.output, estimate.indirect);
+    return {estimate.relative_error[0], 0.0, estimate.samples, estimate.rays};
+}
+
+Achieved trace_picture(const ReferenceCommand& command, const Surface& surface,
+                       PathTracerOptions options) {
+    options.batches = 4; // a pixel has few samples, and a picture many pixels
+    PictureEstimate estimate = render_reference(surface, command.light, command.camera,
+                                                layer_from_name(command.layer), options);
+    const Achieved achieved{estimate.relative_error, 0.0, estimate.samples, estimate.rays};
+    estimate.image.attributes = provenance(command, surface.scene(), achieved);
+    write_image(command.output, estimate.image, PixelType::full_float);
+    return achieved;
+}
+
+void run(ReferenceCommand& command, bool has_camera) {
+    command.light.check();
+    layer_from_name(command.layer);
+    if (command.points.empty()) {
+        if (!has_camera)
+            throw UsageError("reference needs --camera-position and --camera-target, or --points");
+        command.camera.check();
+    }
+    const ThreadLimit limit(command.run.threads);
+    const Scene scene = load_scene(command.scene);
+    if (const std::string line = scene.summary.line(); !line.empty() && !command.run.quiet)
+        std::fprintf(stderr, "%s: %s\n", command.scene.c_str(), line.c_str());
+    const Surface surface(scene);
+
+    const auto start = std::chrono::steady_clock::now();
+    Achieved achieved;
+    {
+        Progress progress("tracing paths", !command.run.quiet);
+        PathTracerOptions options;
+        options.samples = command.samples;
+        options.target_error = command.target_error;
+        options.seed = command.run.seed;
+        options.progress = [&](double share) { progress.update(share); };
+        achieved = command.points.empty() ? trace_picture(command, surface, options)
+                                          : trace_points(command, surface, options);
+    }
+    achieved.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!command.report.empty()) write_report(command.report, command, scene, achieved);
+    if (!command.run.quiet)
+        std::fprintf(stderr, "relative standard error %.3g %% (%.3g paths, %.3g rays, %s)\n",
+                     100.0 * achieved.relative_error, static_cast<double>(achieved.samples),
+                     static_cast<double>(achieved.rays), duration_text(achieved.seconds).c_str());
+}
+
+} // namespace
+
+void add_reference_command(CLI::App& app) {
+    CLI::App* sub = app.add_subcommand(
+        "reference", "Indirect light by unbiased path tracing: a picture, or irradiance at points");
+    const auto command = std::make_shared<ReferenceCommand>();
+    sub->add_option("scene", command->scene, "Wavefront OBJ file or builtin:NAME")->required();
+    sub->add_option("-o,--output", command->output,
+                    "Picture (.exr, .png), or CSV file with --points")
+        ->required();
+    CLI::Option* points =
+        sub->add_option("--points", command->points,
+                        "CSV file of x,y,z,nx,ny,nz: writes the indirect irradiance "
+                        "at each as E_r,E_g,E_b");
+    sub->add_option(
+           "--layer", command->layer,
+           "direct, indirect (radiance to the camera), full or irradiance (default indirect)")
+        ->excludes(points);
+    CLI::Option* samples =
+        sub->add_option("--spp", command->samples, "Paths a pixel or point (default 256)")
+            ->check(CLI::Range(Index{1}, Index{1} << 24));
+    add_number(*sub, "--target-error", command->target_error,
+               "Instead: trace until the relative standard error is below this share, such as 0.02")
+        ->excludes(samples);
+    sub->add_option("--report", command->report, "JSON file for samples, rays, time and error");
+    add_light_options(*sub, command->light);
+    add_camera_options(*sub, command->camera);
+    add_run_options(*sub, command->run);
+    sub->callback([sub, command] {
+        if (sub->count("--target-error") > 0 && !(command->target_error > 0.0))
+            throw UsageError("--target-error must be positive");
+        run(*command, camera_was_given(*sub));
+    });
+}
+
+} // namespace afterglow

@@ -1,0 +1,114 @@
+#include "transport/csv_points.h"
+
+#include "core/error.h"
+#include "core/file.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <string_view>
+#include <utility>
+
+namespace afterglow {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+    const auto begin = text.find_first_not_of(" \t\r");
+    if (begin == std::string_view::npos) return {};
+    return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+bool parse_number(std::string_view text, float& value) {
+    text = trimmed(text);
+    if (text.starts_with('+')) text.remove_prefix(1);
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
+}
+
+/// A first line none of whose fields is a number.
+bool is_header(std::string_view line) {
+    for (;;) {
+        const auto comma = line.find(',');
+        float value = 0.0f;
+        if (parse_number(line.substr(0, comma), value)) return false;
+        if (comma == std::string_view::npos) return true;
+        line.remove_prefix(comma + 1);
+    }
+}
+
+/// Calls use(line_number, row) for each line of `columns` numbers. Blank lines are skipped.
+template <std::size_t columns, class Use>
+void read_rows(const std::string& path, const char* names, const Use& use) {
+    std::ifstream file(path);
+    if (!file) throw FileError(path, "cannot be opened");
+    std::string text;
+    bool first = true;
+    for (std::size_t number = 1; std::getline(file, text); ++number) {
+        std::string_view rest = trimmed(text);
+        if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3); // a byte order mark
+        if (rest.empty()) continue;
+        if (std::exchange(first, false) && is_header(rest)) continue;
+        const std::string where = "line " + std::to_string(number) + ": ";
+        std::array<float, columns> row{};
+        for (std::size_t c = 0; c < columns; ++c) {
+            const auto comma = rest.find(',');
+            if ((comma == std::string_view::npos) != (c + 1 == columns))
+                throw FileError(path, where + "must hold " + std::to_string(columns) + " numbers "
+                                          + names);
+            if (!parse_number(rest.substr(0, comma), row[c]))
+                throw FileError(path, where + "'" + std::string(trimmed(rest.substr(0, comma)))
+                                          + "' is not a finite number");
+            if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);
+        }
+        use(where, row);
+    }
+    if (file.bad()) throw FileError(path, "cannot be read to its end");
+}
+
+void append_number(std::string& text, float value) {
+    std::array<char, 32> digits;
+    text.append(digits.data(),
+                std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+}
+
+} // namespace
+
+std::vector<SurfacePoint> read_points_csv(const std::string& path) {
+    std::vector<SurfacePoint> points;
+    read_rows<6>(path, "x,y,z,nx,ny,nz", [&](const std::string& where, const auto& row) {
+        const Vec3 normal(row[3], row[4], row[5]);
+        const Vec3 unit = normal.stableNormalized();
+        if (!(std::abs(unit.norm() - 1.0f) < 1e-3f))
+            throw FileError(path, where + "the normal must not be zero");
+        points.push_back({Vec3(row[0], row[1], row[2]), unit});
+    });
+    if (points.empty()) throw FileError(path, "holds no points");
+    return points;
+}
+
+void write_irradiance_csv(const std::string& path, const Eigen::Array3Xf& irradiance) {
+    std::string text = "E_r,E_g,E_b\n";
+    for (Index k = 0; k < irradiance.cols(); ++k)
+        for (int c = 0; c < 3; ++c) {
+            append_number(text, irradiance(c, k));
+            text += c < 2 ? ',' : '\n';
+        }
+    write_atomically(path, [&](const std::string& temporary) {
+        std::ofstream file(temporary, std::ios::binary);
+        file.write(text.data(), static_cast<std::streamsize>(text.size()));
+        file.close();
+        if (!file) throw FileError(path, "cannot be written");
+    });
+}
+
+Eigen::Array3Xf read_irradiance_csv(const std::string& path) {
+    std::vector<float> values;
+    read_rows<3>(path, "E_r,E_g,E_b", [&](const std::string&, const auto& row) {
+        values.insert(values.end(), row.begin(), row.end());
+    });
+    if (values.empty()) throw FileError(path, "holds no values");
+    return Eigen::Array3Xf::Map(values.data(), 3, static_cast<Index>(values.size() / 3));
+}
+
+} // namespace afterglow

@@ -1,0 +1,203 @@
+#include "transport/path_tracer.h"
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/sampling.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+constexpr std::size_t block_size = 64; // paths that advance together, for packets of rays
+
+/// Where a path starts, and the factor from its irradiance to what is asked.
+struct PathStart {
+    SurfacePoint x;
+    Rgb weight = Rgb::Ones();
+    std::uint32_t index = 0; // of its sample in the sequence
+};
+
+struct Path {
+    SurfacePoint x;
+    Rgb weight, throughput;
+    std::uint32_t index;
+};
+
+/// Follows at most block_size paths to their ends and adds what they gather of light l to sums[l].
+/// Returns the number of rays.
+std::uint64_t trace_paths(const Surface& surface, std::span<const Spotlight> lights,
+                          std::uint64_t seed, std::span<const PathStart> starts,
+                          std::span<Eigen::Array3d> sums) {
+    std::array<Path, block_size> paths;
+    std::array<Ray, block_size> rays;
+    std::array<Hit, block_size> hits;
+    std::size_t alive = 0;
+    for (const PathStart& start : starts)
+        paths[alive++] = {start.x, start.weight, Rgb::Ones(), start.index};
+
+    std::uint64_t ray_count = 0;
+    for (std::uint64_t depth = 0; alive > 0; ++depth) {
+        const std::uint64_t bounce_seed = hash64(seed, depth);
+        for (std::size_t k = 0; k < alive; ++k) {
+            const Path& path = paths[k];
+            const Vec3 local = sample_cosine(shuffled_sobol2(path.index, bounce_seed));
+            rays[k] = {surface.lifted(path.x), Frame(path.x.normal).to_world(local)};
+        }
+        surface.closest_hits({rays.data(), alive}, {hits.data(), alive});
+        ray_count += alive;
+
+        std::size_t survivors = 0;
+        for (std::size_t k = 0; k < alive; ++k) {
+            if (!hits[k]) continue;
+            Path path = paths[k];
+            path.x = surface.point(hits[k]);
+            path.throughput *= surface.reflectance(hits[k]);
+            for (std::size_t l = 0; l < lights.size(); ++l) {
+                const Rgb unoccluded = unoccluded_irradiance(lights[l], path.x);
+                if ((unoccluded == 0.0f).all()) continue;
+                ++ray_count;
+                if (surface.blocked(surface.lifted(path.x), lights[l].position)) continue;
+                sums[l] += (path.weight * path.throughput * unoccluded).cast<double>();
+            }
+            // Below one, so that even a scene of reflectance one lets every path end.
+            const float survival = std::min(0.999f, path.throughput.maxCoeff());
+            if (Rng(bounce_seed, path.index).uniform() >= survival) continue;
+            path.throughput /= survival;
+            paths[survivors++] = path;
+        }
+        alive = survivors;
+    }
+    return ray_count;
+}
+
+} // namespace
+
+IrradianceEstimate estimate_irradiance(const Surface& surface, std::span<const Spotlight> lights,
+                                       std::span<const SurfacePoint> points,
+                                       const PathTracerOptions& options) {
+    const auto point_count = static_cast<Index>(points.size());
+    const auto light_count = static_cast<Index>(lights.size());
+    const Sampler sampler = [&](Index item, std::uint64_t seed, Index first, Index count,
+                                std::span<Eigen::Array3d> sums) {
+        std::array<PathStart, block_size> starts;
+        std::uint64_t rays = 0;
+        for (Index done = 0; done < count;) {
+            std::size_t used = 0;
+            for (; used < block_size && done < count; ++used, ++done)
+                starts[used] = {points[static_cast<std::size_t>(item)], Rgb::Ones(),
+                                static_cast<std::uint32_t>(first + done)};
+            rays += trace_paths(surface, lights, seed, {starts.data(), used}, sums);
+        }
+        return rays;
+    };
+    MeanEstimate means = estimate_means(point_count, light_count, sampler, options);
+
+    IrradianceEstimate result;
+    result.indirect = std::move(means.mean);
+    result.standard_error = std::move(means.standard_error);
+    result.relative_error = std::move(means.relative_error);
+    result.samples = means.samples;
+    result.rays = means.rays;
+    result.direct.resize(3, point_count * light_count);
+    parallel_for(point_count * light_count, [&](Index k) {
+        result.direct.col(k) =
+            direct_irradiance(surface, lights[static_cast<std::size_t>(k % light_count)],
+                              points[static_cast<std::size_t>(k / light_count)]);
+    });
+    return result;
+}
+
+Layer layer_from_name(std::string_view name) {
+    for (const Layer layer : {Layer::direct, Layer::indirect, Layer::full, Layer::irradiance})
+        if (name == layer_name(layer)) return layer;
+    throw UsageError("unknown layer '" + std::string(name)
+                     + "'; there are direct, indirect, full and irradiance");
+}
+
+std::string layer_name(Layer layer) {
+    switch (layer) {
+    case Layer::direct:
+        return "direct";
+    case Layer::indirect:
+        return "indirect";
+    case Layer::full:
+        return "full";
+    case Layer::irradiance:
+        return "irradiance";
+    }
+    return {};
+}
+
+PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
+                                 const Camera& camera, Layer layer,
+                                 const PathTracerOptions& options) {
+    constexpr std::uint64_t jitter_dimension = 0x70697865; // beyond any bounce of a path
+    const Index pixel_count = static_cast<Index>(camera.width) * camera.height;
+    const bool wants_direct = layer == Layer::direct || layer == Layer::full;
+    const bool wants_indirect = layer != Layer::direct;
+
+    const Sampler sampler = [&](Index item, std::uint64_t seed, Index first, Index count,
+                                std::span<Eigen::Array3d> sums) {
+        const auto left = static_cast<float>(item % camera.width);
+        const auto top = static_cast<float>(item / camera.width);
+        std::array<Ray, block_size> rays;
+        std::array<Hit, block_size> hits;
+        std::array<PathStart, block_size> starts;
+        std::uint64_t ray_count = 0;
+        for (Index done = 0; done < count;) {
+            std::array<std::uint32_t, block_size> index;
+            std::size_t used = 0;
+            for (; used < block_size && done < count; ++used, ++done) {
+                index[used] = static_cast<std::uint32_t>(first + done);
+                const Vec2 jitter = shuffled_sobol2(index[used], hash64(seed, jitter_dimension));
+                rays[used] = {camera.position,
+                              camera.direction(left + jitter.x(), top + jitter.y())};
+            }
+            surface.closest_hits({rays.data(), used}, {hits.data(), used});
+            ray_count += used;
+            std::size_t seen = 0;
+            for (std::size_t k = 0; k < used; ++k) {
+                if (!hits[k]) continue;
+                const Rgb weight =
+                    layer == Layer::irradiance
+                        ? Rgb(Rgb::Ones())
+                        : Rgb(surface.reflectance(hits[k]) / static_cast<float>(EIGEN_PI));
+                starts[seen++] = {surface.point(hits[k]), weight, index[k]};
+                if (!wants_direct) continue;
+                ++ray_count;
+                sums[0] +=
+                    (weight * direct_irradiance(surface, light, starts[seen - 1].x)).cast<double>();
+            }
+            if (wants_indirect)
+                ray_count += trace_paths(surface, {&light, 1}, seed, {starts.data(), seen}, sums);
+        }
+        return ray_count;
+    };
+
+    // Errors are stated over the pixels that see something, the estimator knows all of them.
+    const Index covered = parallel_sum(pixel_count, Index{0}, [&](Index k) -> Index {
+        const Vec3 direction = camera.direction(static_cast<float>(k % camera.width) + 0.5f,
+                                                static_cast<float>(k / camera.width) + 0.5f);
+        return surface.closest_hit({camera.position, direction}) ? 1 : 0;
+    });
+    const double to_all = std::sqrt(static_cast<double>(pixel_count)
+                                    / static_cast<double>(std::max<Index>(1, covered)));
+    PathTracerOptions all = options;
+    all.target_error *= to_all;
+    const MeanEstimate means = estimate_means(pixel_count, 1, sampler, all);
+
+    PictureEstimate result;
+    result.image = Image(camera.width, camera.height);
+    for (Index k = 0; k < pixel_count; ++k)
+        result.image.set_pixel(static_cast<int>(k % camera.width),
+                               static_cast<int>(k / camera.width), means.mean.col(k));
+    result.relative_error = means.relative_error[0] / to_all;
+    result.samples = means.samples;
+    result.rays = means.rays;
+    return result;
+}
+
+} // namespace afterglow

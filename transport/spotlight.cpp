@@ -1,0 +1,60 @@
+#include "transport/spotlight.h"
+
+#include "core/error.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+float cos_degrees(float angle) {
+    return static_cast<float>(std::cos(static_cast<double>(angle) * EIGEN_PI / 180.0));
+}
+
+} // namespace
+
+void Spotlight::check() {
+    if (!position.allFinite() || !direction.allFinite() || !intensity.allFinite()
+        || !std::isfinite(inner_angle) || !std::isfinite(outer_angle))
+        throw UsageError("a spotlight's position, direction, cone and intensity must be finite");
+    if (!(inner_angle >= 0.0f && inner_angle <= outer_angle && outer_angle > 0.0f
+          && outer_angle <= 180.0f))
+        throw UsageError("a spotlight's cone must satisfy 0 <= inner <= outer <= 180 and outer > 0 "
+                         "(half-angles in degrees), not "
+                         + std::to_string(inner_angle) + "," + std::to_string(outer_angle));
+    if ((intensity < 0.0f).any()) throw UsageError("a spotlight's intensity must not be negative");
+    direction = direction.stableNormalized().eval();
+    if (!(std::abs(direction.norm() - 1.0f) < 1e-3f))
+        throw UsageError("a spotlight's direction must not be zero");
+}
+
+float Spotlight::falloff(float c) const {
+    const float cos_outer = cos_degrees(outer_angle);
+    if (inner_angle == outer_angle) return c >= cos_outer ? 1.0f : 0.0f;
+    if (c <= cos_outer) return 0.0f;
+    // The bound of .001 is the one of KHR_lights_punctual.
+    const float width = std::max(0.001f, cos_degrees(inner_angle) - cos_outer);
+    const float t = std::min(1.0f, (c - cos_outer) / width);
+    return t * t;
+}
+
+Rgb unoccluded_irradiance(const Spotlight& light, const SurfacePoint& x) {
+    const Vec3 to_light = light.position - x.position;
+    const float squared_distance = to_light.squaredNorm();
+    if (!(squared_distance > 0.0f)) return Rgb::Zero();
+    const Vec3 direction = to_light / std::sqrt(squared_distance);
+    const float cos_surface = direction.dot(x.normal);
+    if (cos_surface <= 0.0f) return Rgb::Zero();
+    const float falloff = light.falloff(-direction.dot(light.direction));
+    return light.intensity * (falloff * cos_surface / squared_distance);
+}
+
+Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const SurfacePoint& x) {
+    const Rgb irradiance = unoccluded_irradiance(light, x);
+    if ((irradiance == 0.0f).all() || surface.blocked(surface.lifted(x), light.position))
+        return Rgb::Zero();
+    return irradiance;
+}
+
+} // namespace afterglow
