@@ -17,7 +17,7 @@ struct EstimatorOptions {
     Index max_samples = 1 << 22; // mean number an item at which a run for target_error gives up
     int batches = 16; // independent repetitions from which the error is estimated, at least 2
     std::uint64_t seed = 1;
-    std::function<void(double)> progress; // called now and then with the share that is done
+    std::function<void(double)> progress = {}; // called now and then with the share that is done
 };
 
 /// Adds the samples first ... first + count - 1 of the sequence `seed` to sums[0 ... outputs - 1].

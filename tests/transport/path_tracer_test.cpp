@@ -1,0 +1,296 @@
+#include "core/builtin_scenes.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/sampling.h"
+#include "transport/path_tracer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace afterglow {
+namespace {
+
+constexpr double pi = EIGEN_PI;
+
+/// Points uniform over a scene's area, on the side of the triangles' winding.
+std::vector<SurfacePoint> points_by_area(const Scene& scene, int count, std::uint64_t seed) {
+    std::vector<double> area_below;
+    double total = 0.0;
+    const auto corner = [&](std::size_t t, int c) {
+        return scene.positions[scene.triangles[t][c]];
+    };
+    const auto cross = [&](std::size_t t) -> Vec3 {
+        return (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0));
+    };
+    for (std::size_t t = 0; t < scene.triangles.size(); ++t)
+        area_below.push_back(total += cross(t).norm());
+    std::vector<SurfacePoint> points;
+    for (int i = 0; i < count; ++i) {
+        Rng rng(seed, static_cast<std::uint64_t>(i));
+        const double chosen = total * (i + rng.uniform()) / count;
+        const auto t = static_cast<std::size_t>(
+            std::upper_bound(area_below.begin(), area_below.end() - 1, chosen)
+            - area_below.begin());
+        const float s = std::sqrt(rng.uniform()), r = rng.uniform();
+        points.push_back({corner(t, 0) + s * (1.0f - r) * (corner(t, 1) - corner(t, 0))
+                              + s * r * (corner(t, 2) - corner(t, 0)),
+                          cross(t).normalized()});
+    }
+    return points;
+}
+
+struct MeanAndError {
+    double mean = 0.0, error = 0.0;
+};
+
+/// Mean over points and channels with the error that the choice of the points adds.
+MeanAndError over_points(const Eigen::Array3Xf& values) {
+    const Eigen::ArrayXd v = values.cast<double>().colwise().mean().transpose();
+    const double n = static_cast<double>(v.size());
+    return {v.mean(), std::sqrt((v - v.mean()).square().sum() / (n * (n - 1.0)))};
+}
+
+/// Four standard errors, of which a relative error of 2 % would be at least eight: an estimate that
+/// is wrong by 2 % fails for certain.
+void expect_equal_within_noise(double measured, double exact, double error,
+                               const std::string& what) {
+    EXPECT_LT(std::abs(measured - exact), 4.0 * error)
+        << what << ": " << measured << " +- " << error << ", exact " << exact;
+    EXPECT_GT(0.02 * exact / error, 8.0) << what << ": this test could not see an error of 2 %";
+}
+
+Spotlight hard_spot(const Vec3& position, const Vec3& direction, float angle) {
+    Spotlight light{.position = position,
+                    .direction = direction,
+                    .inner_angle = angle,
+                    .outer_angle = angle,
+                    .intensity = Rgb::Constant(2.0f)};
+    light.check();
+    return light;
+}
+
+double flux(const Spotlight& hard) {
+    return hard.intensity[0] * 2.0 * pi * (1.0 - std::cos(hard.outer_angle * pi / 180.0));
+}
+
+class Furnace : public testing::TestWithParam<const char*> {};
+
+TEST_P(Furnace, IndirectIrradianceInAClosedSphereIsUniformAndFollowsFromTheFlux) {
+    const double rho = std::stod(GetParam());
+    const Scene scene = make_builtin_scene("builtin:sphere:" + std::string(GetParam()));
+    const Surface surface(scene);
+    const Spotlight light = hard_spot(Vec3(0.1f, 0.2f, 0.3f), Vec3(0.3f, -1.0f, 0.2f), 70.0f);
+    const std::vector<SurfacePoint> points = points_by_area(scene, 64, 3);
+    const IrradianceEstimate estimate = estimate_irradiance(
+        surface, {&light, 1}, points, {.samples = rho > 0.9 ? 1024 : 4096, .seed = 5});
+
+    const double exact = rho / (1.0 - rho) * flux(light) / (4.0 * pi);
+    const double error =
+        std::sqrt(estimate.standard_error.row(1).cast<double>().square().sum()) / 64.0;
+    expect_equal_within_noise(estimate.indirect.row(1).cast<double>().mean(), exact, error, "mean");
+    for (Index k = 0; k < 64; ++k)
+        EXPECT_NEAR(estimate.indirect(1, k), exact, 6.5 * estimate.standard_error(1, k))
+            << "at " << points[static_cast<std::size_t>(k)].position.transpose();
+}
+
+TEST_P(Furnace, MeanIrradianceInAClosedBoxIsFluxOverAbsorbedShare) {
+    const double rho = std::stod(GetParam());
+    const Scene scene = make_builtin_scene("builtin:furnace:" + std::string(GetParam()));
+    const Surface surface(scene);
+    const Spotlight light = hard_spot(Vec3(-0.3f, 0.4f, 0.1f), Vec3(1.0f, -0.7f, 0.2f), 75.0f);
+    const IrradianceEstimate estimate =
+        estimate_irradiance(surface, {&light, 1}, points_by_area(scene, 8192, 4),
+                            {.samples = rho > 0.9 ? 32 : 96, .seed = 6});
+
+    const double direct = flux(light) / 24.0; // six faces of 2 x 2
+    const MeanAndError indirect = over_points(estimate.indirect);
+    expect_equal_within_noise(indirect.mean, rho / (1.0 - rho) * direct, indirect.error,
+                              "indirect");
+    const MeanAndError measured_direct = over_points(estimate.direct);
+    EXPECT_NEAR(measured_direct.mean, direct, 4.0 * measured_direct.error);
+}
+
+INSTANTIATE_TEST_SUITE_P(Reflectance, Furnace, testing::Values("0.2", "0.5", "0.8", "0.95"),
+                         [](const auto& test) {
+                             return "Percent"
+                                    + std::to_string(std::lround(100.0 * std::stod(test.param)));
+                         });
+
+/// The rectangle [0, a] x [0, b] at z = 0, facing +z.
+Scene rectangle(float a, float b, float reflectance) {
+    Scene scene;
+    scene.name = "rectangle";
+    scene.positions = {Vec3(0, 0, 0), Vec3(a, 0, 0), Vec3(a, b, 0), Vec3(0, b, 0)};
+    scene.triangles = {{0, 1, 2}, {0, 2, 3}};
+    scene.material_index = {0, 0};
+    Material grey;
+    grey.reflectance = Rgb::Constant(reflectance);
+    scene.materials = {grey};
+    return scene;
+}
+
+// A distant light makes the irradiance of the rectangle uniform to 1e-6; the light of one bounce at
+// a point is then reflectance x irradiance x form factor (catalogue of J. Howell, C-3 and C-4).
+TEST(PathTracer, OneBounceFromAUniformRectangleIsItsFormFactor) {
+    constexpr float a = 1.5f, b = 0.8f, reflectance = 0.6f, distance = 2000.0f;
+    const Scene scene = rectangle(a, b, reflectance);
+    const Surface surface(scene);
+    Spotlight light{.position = Vec3(0.75f, 0.4f, distance),
+                    .direction = -Vec3::UnitZ(),
+                    .inner_angle = 10.0f,
+                    .outer_angle = 20.0f,
+                    .intensity = Rgb::Constant(distance * distance)};
+    light.check();
+    for (const float c : {0.2f, 0.7f, 2.0f}) {
+        const std::vector<SurfacePoint> points = {{Vec3(0.0f, 0.0f, c), -Vec3::UnitZ()},
+                                                  {Vec3(0.0f, 0.0f, c), Vec3::UnitX()}};
+        const double h = c, root_a = std::sqrt(h * h + double{a} * a),
+                     root_b = std::sqrt(h * h + double{b} * b);
+        const double parallel =
+            (a / root_a * std::atan(b / root_a) + b / root_b * std::atan(a / root_b)) / (2.0 * pi);
+        const double perpendicular =
+            (std::atan(b / h) - h / root_a * std::atan(b / root_a)) / (2.0 * pi);
+        const IrradianceEstimate e =
+            estimate_irradiance(surface, {&light, 1}, points, {.samples = 1 << 18, .seed = 2});
+        expect_equal_within_noise(e.indirect(0, 0), reflectance * parallel, e.standard_error(0, 0),
+                                  "parallel at " + std::to_string(c));
+        expect_equal_within_noise(e.indirect(0, 1), reflectance * perpendicular,
+                                  e.standard_error(0, 1), "perpendicular at " + std::to_string(c));
+    }
+}
+
+class InTheCornellBox : public testing::Test {
+protected:
+    Scene scene = make_builtin_scene("builtin:cornell");
+    Surface surface{scene};
+    std::vector<Spotlight> lights = {
+        hard_spot(Vec3(0.278f, 0.54f, 0.28f), Vec3(0.2f, -1.0f, 0.1f), 40.0f),
+        hard_spot(Vec3(0.278f, 0.273f, -0.8f), Vec3(0.1f, 0.1f, 1.0f), 15.0f)};
+    std::vector<SurfacePoint> points = points_by_area(scene, 256, 8);
+};
+
+TEST_F(InTheCornellBox, SameBytesOnAnyNumberOfThreads) {
+    for (const double target : {0.0, 0.05}) {
+        const PathTracerOptions options{.samples = 128, .target_error = target, .seed = 3};
+        std::vector<IrradianceEstimate> runs;
+        for (const int threads : {1, 2, 5}) {
+            const ThreadLimit limit(threads);
+            runs.push_back(estimate_irradiance(surface, lights, points, options));
+        }
+        for (const IrradianceEstimate& run : runs) {
+            EXPECT_TRUE((run.indirect == runs[0].indirect).all());
+            EXPECT_TRUE((run.standard_error == runs[0].standard_error).all());
+            EXPECT_TRUE((run.direct == runs[0].direct).all());
+            EXPECT_EQ(run.rays, runs[0].rays);
+        }
+    }
+}
+
+TEST_F(InTheCornellBox, ALightSeesTheSameInCompanyAsAlone) {
+    const PathTracerOptions options{.samples = 64, .seed = 3};
+    const IrradianceEstimate both = estimate_irradiance(surface, lights, points, options);
+    for (std::size_t l = 0; l < lights.size(); ++l) {
+        const IrradianceEstimate alone =
+            estimate_irradiance(surface, {&lights[l], 1}, points, options);
+        for (Index p = 0; p < 256; ++p)
+            EXPECT_TRUE(
+                (both.indirect.col(2 * p + static_cast<Index>(l)) == alone.indirect.col(p)).all());
+    }
+}
+
+TEST_F(InTheCornellBox, StandardErrorIsHonest) {
+    const IrradianceEstimate coarse =
+        estimate_irradiance(surface, lights, points, {.samples = 512, .seed = 11});
+    const IrradianceEstimate fine =
+        estimate_irradiance(surface, lights, points, {.samples = 8192, .seed = 12});
+    double squares = 0.0;
+    Index count = 0;
+    for (Index k = 0; k < coarse.indirect.cols(); ++k) {
+        const double variance =
+            std::pow(coarse.standard_error(1, k), 2.0) + std::pow(fine.standard_error(1, k), 2.0);
+        if (!(fine.indirect(1, k) > 0.0f)) continue; // bottoms of the blocks
+        squares += std::pow(coarse.indirect(1, k) - fine.indirect(1, k), 2.0) / variance;
+        ++count;
+    }
+    EXPECT_GT(count, 300);
+    // A variance from 16 batches makes z follow Student's t with 15 degrees of freedom: mean of z^2
+    // 15/13, variance of z^2 3.4. The two lights share paths; four standard errors of 256 values.
+    EXPECT_NEAR(squares / static_cast<double>(count), 15.0 / 13.0, 4.0 * std::sqrt(3.4 / 256.0));
+}
+
+TEST_F(InTheCornellBox, TargetErrorIsReachedWithoutBias) {
+    const IrradianceEstimate estimate =
+        estimate_irradiance(surface, lights, points, {.target_error = 0.03, .seed = 21});
+    const IrradianceEstimate fine =
+        estimate_irradiance(surface, lights, points, {.samples = 8192, .seed = 22});
+    for (std::size_t l = 0; l < 2; ++l) {
+        EXPECT_LE(estimate.relative_error[l], 0.03);
+        double difference = 0.0, variance = 0.0, mean = 0.0;
+        for (Index k = static_cast<Index>(l); k < estimate.indirect.cols(); k += 2) {
+            difference += estimate.indirect(1, k) - fine.indirect(1, k);
+            mean += fine.indirect(1, k);
+            variance += std::pow(estimate.standard_error(1, k), 2.0)
+                        + std::pow(fine.standard_error(1, k), 2.0);
+        }
+        expect_equal_within_noise(mean + difference, mean, std::sqrt(variance),
+                                  "light " + std::to_string(l));
+    }
+}
+
+TEST_F(InTheCornellBox, AFullPictureIsDirectPlusIndirectAndBlackOutside) {
+    Camera camera{.position = Vec3(0.278f, 0.273f, -1.4f),
+                  .target = Vec3(0.278f, 0.273f, 0.0f),
+                  .vertical_fov = 35.0f,
+                  .width = 24,
+                  .height = 16};
+    camera.check();
+    const auto render = [&](Layer layer) {
+        return render_reference(surface, lights[0], camera, layer, {.samples = 16, .seed = 4})
+            .image;
+    };
+    const Image direct = render(Layer::direct), indirect = render(Layer::indirect),
+                full = render(Layer::full), irradiance = render(Layer::irradiance);
+    int black = 0;
+    for (int y = 0; y < camera.height; ++y)
+        for (int x = 0; x < camera.width; ++x) {
+            EXPECT_TRUE(full.pixel(x, y).isApprox(direct.pixel(x, y) + indirect.pixel(x, y), 1e-5f)
+                        || (full.pixel(x, y) == 0.0f).all());
+            EXPECT_TRUE((irradiance.pixel(x, y) >= indirect.pixel(x, y)).all());
+            black += (irradiance.pixel(x, y) == 0.0f).all();
+        }
+    EXPECT_TRUE((full.pixel(0, 0) == 0.0f).all());
+    EXPECT_GT(black, 24 * 16 / 4);
+    EXPECT_LT(black, 24 * 16 * 3 / 4);
+}
+
+TEST(PathTracer, APictureOfAFurnaceIsItsClosedForm) {
+    const Scene scene = make_builtin_scene("builtin:sphere:0.5");
+    const Surface surface(scene);
+    const Spotlight light = hard_spot(Vec3(0.0f, 0.1f, 0.2f), Vec3(0.0f, -1.0f, 0.0f), 50.0f);
+    Camera camera{.position = Vec3::Zero(), .target = Vec3::UnitX(), .width = 32, .height = 32};
+    camera.check();
+    const double irradiance = flux(light) / (4.0 * pi);
+    for (const auto& [layer, exact] : {std::pair(Layer::irradiance, irradiance),
+                                       std::pair(Layer::indirect, irradiance * 0.5 / pi)}) {
+        const PictureEstimate picture =
+            render_reference(surface, light, camera, layer, {.target_error = 0.05, .seed = 9});
+        EXPECT_LE(picture.relative_error, 0.05);
+        const double mean =
+            Eigen::ArrayXf::Map(picture.image.rgb.data(), 3 * 32 * 32).cast<double>().mean();
+        expect_equal_within_noise(mean, exact, picture.relative_error * exact / 32.0,
+                                  layer_name(layer));
+    }
+}
+
+TEST(PathTracer, LayersHaveNames) {
+    for (const Layer layer : {Layer::direct, Layer::indirect, Layer::full, Layer::irradiance})
+        EXPECT_EQ(layer_from_name(layer_name(layer)), layer);
+    EXPECT_THROW(layer_from_name("Indirect"), UsageError);
+}
+
+} // namespace
+} // namespace afterglow
