@@ -16,6 +16,9 @@
 #include <fstream>
 #include <istream>
 #include <map>
+#include <memory>
+#include <set>
+#include <span>
 #include <streambuf>
 #include <string_view>
 
@@ -169,6 +172,7 @@ public:
         const fs::path whole = beside(folder_, line), part = beside(folder_, name);
         const fs::path& path = is_file(whole) ? whole : part;
 
+        if (!asked_.insert(path).second) return is_file(path); // it was read, or told of, before
         std::ifstream file(path);
         if (!is_file(path) || !file) {
             summary_.missing_files.push_back(path.string());
@@ -196,6 +200,7 @@ private:
     fs::path folder_;
     const LineBuffer& obj_;
     SceneSummary& summary_;
+    std::set<fs::path> asked_;
 };
 
 float linear_from_srgb(int byte) {
@@ -259,7 +264,6 @@ struct RawObj {
 struct Collector {
     RawObj& raw;
     const std::string& path;
-    std::map<std::string, int, std::less<>> material_by_name{};
     const std::vector<MaterialSource>& sources;
     int material = -1;
 
@@ -288,10 +292,9 @@ struct Collector {
     void use_material(std::string_view name, int id) {
         material = id;
         if (material >= 0) return;
-        for (std::size_t i = material_by_name.size(); i < sources.size(); ++i)
-            material_by_name.try_emplace(sources[i].material.name, static_cast<int>(i));
-        const auto found = material_by_name.find(trimmed(name));
-        if (found != material_by_name.end()) material = found->second;
+        const std::string_view wanted = trimmed(name);
+        for (std::size_t i = 0; i < sources.size() && material < 0; ++i)
+            if (sources[i].material.name == wanted) material = static_cast<int>(i);
     }
 };
 
@@ -325,7 +328,7 @@ RawObj parse(const std::string& path, SceneSummary& summary) {
     MaterialFiles material_files(fs::path(path).parent_path(), lines, summary);
 
     RawObj raw;
-    Collector collector{raw, path, {}, material_files.sources};
+    Collector collector{raw, path, material_files.sources};
     tinyobj::LoadObjWithCallback(stream, callbacks(), &collector, &material_files);
     raw.materials = std::move(material_files.sources);
     return raw;

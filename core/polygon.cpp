@@ -46,7 +46,7 @@ public:
             previous_[i] = (i + n - 1) % n;
         }
         // Enough for any sensible face; a monstrous one must not take quadratic time and more.
-        tests_left_ = 8 * point_.size() * std::min<std::size_t>(point_.size(), 1024);
+        tests_left_ = 8 * point_.size() * std::min<std::size_t>(point_.size(), 256);
     }
 
     void clip(std::vector<std::array<std::uint32_t, 3>>& triangles) {

@@ -64,11 +64,14 @@ std::string SceneSummary::line() const {
         std::to_string(faces) + " faces, " + std::to_string(triangles) + " triangles";
     if (!dropped.empty()) line += "; dropped: " + dropped;
     if (!mended.empty()) line += "; " + mended;
-    if (!missing_files.empty()) {
-        line += "; cannot read";
-        for (const std::string& file : missing_files)
-            line += (&file == &missing_files.front() ? " " : ", ") + file;
-    }
+    constexpr std::size_t most_names = 5;
+    for (std::size_t i = 0; i < std::min(missing_files.size(), most_names); ++i)
+        line += (i == 0 ? "; cannot read " : ", ") + missing_files[i];
+    if (missing_files.size() > most_names)
+        line += " and " + std::to_string(missing_files.size() - most_names) + " more";
+    // A name out of a damaged file may hold anything.
+    std::replace_if(
+        line.begin(), line.end(), [](unsigned char c) { return c < 32; }, '?');
     return line;
 }
 
