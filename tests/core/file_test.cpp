@@ -1,6 +1,6 @@
 #include "core/error.h"
 #include "core/file.h"
-#include "tests/core/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <gtest/gtest.h>
 

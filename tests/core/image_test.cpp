@@ -1,7 +1,7 @@
 #include "core/error.h"
 #include "core/image.h"
 #include "core/sampling.h"
-#include "tests/core/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <gtest/gtest.h>
 #include <stb_image.h>

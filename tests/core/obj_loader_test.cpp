@@ -2,7 +2,7 @@
 #include "core/obj_loader.h"
 #include "core/sampling.h"
 #include "core/surface.h"
-#include "tests/core/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

@@ -17,15 +17,15 @@ std::string small_file() {
     const std::vector<std::uint16_t> index = {4, 5};
     const std::vector<Tensor> tensors = {make_tensor<float>("position", {1, 3}, position),
                                          make_tensor<std::uint16_t>("index", {2}, index)};
-    write_safetensors(folder.file("a"), tensors, {{"scene", "a.obj"}, {"seed", "1"}});
-    return file_bytes(folder.file("a"));
+    write_safetensors(folder.path("a"), tensors, {{"scene", "a.obj"}, {"seed", "1"}});
+    return content_of(folder.path("a"));
 }
 
 /// "accepted", or what the one line of the FileError says.
 std::string open(const TemporaryFolder& folder, const std::string& bytes) {
-    put_bytes(folder.file("a"), bytes);
+    folder.write("a", bytes);
     try {
-        const SafetensorsFile file(folder.file("a"));
+        const SafetensorsFile file(folder.path("a"));
     } catch (const FileError& error) {
         const std::string message = error.what();
         EXPECT_EQ(message.find('\n'), std::string::npos) << message;
@@ -81,8 +81,8 @@ TEST(HostileSafetensors, EverySingleFlippedBitIsAnError) {
 
 TEST(HostileSafetensors, AFolderAMissingFileAndOtherFormatsAreErrors) {
     const TemporaryFolder folder;
-    EXPECT_THROW(SafetensorsFile(folder.file(".")), FileError);
-    EXPECT_THROW(SafetensorsFile(folder.file("missing")), FileError);
+    EXPECT_THROW(SafetensorsFile(folder.path(".")), FileError);
+    EXPECT_THROW(SafetensorsFile(folder.path("missing")), FileError);
     EXPECT_NE(open(folder, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "accepted");
     EXPECT_NE(open(folder, std::string(1000, '\0')), "accepted");
 }
@@ -146,16 +146,16 @@ TEST(HostileSafetensors, AbsurdSizesAreRefusedBeforeAnythingLargeIsAllocated) {
     for (const std::uint64_t length :
          {std::uint64_t(1) << 20, std::uint64_t(1) << 40, ~std::uint64_t(0), ~std::uint64_t(7)}) {
         std::memcpy(length_only.data(), &length, sizeof(length));
-        put_bytes(folder.file("a"), length_only);
+        folder.write("a", length_only);
         watch_allocations();
-        EXPECT_THROW(SafetensorsFile(folder.file("a")), FileError);
+        EXPECT_THROW(SafetensorsFile(folder.path("a")), FileError);
         EXPECT_LT(largest_allocation(), 4096u) << length;
     }
     for (const std::string& entries :
          {entry("a", "F32", "[1000000000000]", "[0,4000000000000]"), ",\"a\":" + nested, names}) {
-        put_bytes(folder.file("a"), forge(entries, ""));
+        folder.write("a", forge(entries, ""));
         watch_allocations();
-        EXPECT_THROW(SafetensorsFile(folder.file("a")), FileError);
+        EXPECT_THROW(SafetensorsFile(folder.path("a")), FileError);
         EXPECT_LT(largest_allocation(), std::size_t(4) << 20) << entries.substr(0, 40);
     }
 }

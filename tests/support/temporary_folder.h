@@ -1,19 +1,20 @@
 #pragma once
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <stdlib.h>
+#include <stdexcept>
 #include <string>
 
 namespace afterglow {
 
-/// A folder of a test's own, removed with all it holds at the end.
+/// A fresh folder that goes away with everything in it.
 class TemporaryFolder {
 public:
     TemporaryFolder() {
         std::string name = (std::filesystem::temp_directory_path() / "afterglow-XXXXXX").string();
-        if (!mkdtemp(name.data())) throw std::filesystem::filesystem_error(name, std::error_code());
+        if (!::mkdtemp(name.data())) throw std::runtime_error("cannot make a temporary folder");
         path_ = name;
     }
     ~TemporaryFolder() {
@@ -23,20 +24,25 @@ public:
     TemporaryFolder(const TemporaryFolder&) = delete;
     TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
-    std::string file(const std::string& name) const { return (path_ / name).string(); }
-    bool empty() const { return std::filesystem::is_empty(path_); }
+    std::string path(const std::string& name) const { return (path_ / name).string(); }
+    /// Writes a file, its folders as well, and returns its path.
+    std::string write(const std::string& name, const std::string& content) const {
+        std::filesystem::create_directories((path_ / name).parent_path());
+        std::ofstream(path_ / name, std::ios::binary) << content;
+        return path(name);
+    }
+    std::size_t count() const {
+        return static_cast<std::size_t>(
+            std::distance(std::filesystem::directory_iterator(path_), {}));
+    }
 
 private:
     std::filesystem::path path_;
 };
 
-inline std::string file_bytes(const std::string& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
-inline void put_bytes(const std::string& path, const std::string& bytes) {
-    std::ofstream(path, std::ios::binary) << bytes;
+inline std::string content_of(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
 }
 
 } // namespace afterglow

@@ -56,8 +56,8 @@ std::string message_of(const std::function<void()>& action) {
 TEST(Safetensors, RoundTripKeepsEveryTypeAndString) {
     const TemporaryFolder folder;
     const Sample sample;
-    write_safetensors(folder.file("a"), sample.tensors(), sample.metadata);
-    const SafetensorsFile file(folder.file("a"));
+    write_safetensors(folder.path("a"), sample.tensors(), sample.metadata);
+    const SafetensorsFile file(folder.path("a"));
 
     EXPECT_EQ(file.metadata(), sample.metadata);
     EXPECT_EQ(file.metadata("seed"), "42");
@@ -83,27 +83,27 @@ TEST(Safetensors, RoundTripKeepsEveryTypeAndString) {
 
 TEST(Safetensors, AFileMayHoldNothing) {
     const TemporaryFolder folder;
-    write_safetensors(folder.file("a"), {}, {});
-    const SafetensorsFile file(folder.file("a"));
+    write_safetensors(folder.path("a"), {}, {});
+    const SafetensorsFile file(folder.path("a"));
     EXPECT_TRUE(file.tensors().empty());
     EXPECT_TRUE(file.metadata().empty());
 }
 
 TEST(Safetensors, TheSameArgumentsGiveTheSameBytes) {
     const TemporaryFolder folder;
-    write_safetensors(folder.file("a"), Sample().tensors(), Sample().metadata);
-    write_safetensors(folder.file("b"), Sample().tensors(), Sample().metadata);
-    EXPECT_EQ(file_bytes(folder.file("a")), file_bytes(folder.file("b")));
+    write_safetensors(folder.path("a"), Sample().tensors(), Sample().metadata);
+    write_safetensors(folder.path("b"), Sample().tensors(), Sample().metadata);
+    EXPECT_EQ(content_of(folder.path("a")), content_of(folder.path("b")));
 }
 
 TEST(Safetensors, SpansOutliveTheFileObjectWhileTheMapIsHeld) {
     const TemporaryFolder folder;
     const Sample sample;
-    write_safetensors(folder.file("a"), sample.tensors(), {});
+    write_safetensors(folder.path("a"), sample.tensors(), {});
     std::shared_ptr<const MappedFile> map;
     std::span<const std::uint32_t> index;
     {
-        const SafetensorsFile file(folder.file("a"));
+        const SafetensorsFile file(folder.path("a"));
         map = file.map();
         index = file.tensor<std::uint32_t>("links.index", {40});
     }
@@ -113,33 +113,33 @@ TEST(Safetensors, SpansOutliveTheFileObjectWhileTheMapIsHeld) {
 TEST(Safetensors, AnErrorNamesFileTensorAndWhatWasExpected) {
     const TemporaryFolder folder;
     const Sample sample;
-    write_safetensors(folder.file("a"), sample.tensors(), sample.metadata);
-    const SafetensorsFile file(folder.file("a"));
+    write_safetensors(folder.path("a"), sample.tensors(), sample.metadata);
+    const SafetensorsFile file(folder.path("a"));
     EXPECT_EQ(message_of([&] {
                   file.tensor<float>("points.normal", {any_extent, 3});
               }),
-              folder.file("a")
+              folder.path("a")
                   + ": has no tensor 'points.normal' F32 [any, 3]; run precompute again");
     EXPECT_EQ(message_of([&] {
                   file.tensor<Eigen::half>("points.position", {2, 4});
               }),
-              folder.file("a")
+              folder.path("a")
                   + ": should hold tensor 'points.position' F16 [2, 4], but holds F32 [2, 3]; run "
                     "precompute again");
     EXPECT_EQ(message_of([&] { file.metadata("options"); }),
-              folder.file("a") + ": has no metadata 'options'; run precompute again");
+              folder.path("a") + ": has no metadata 'options'; run precompute again");
 }
 
 TEST(Safetensors, AStringThatIsNotUtf8IsRefusedAndNothingIsWritten) {
     const TemporaryFolder folder;
-    EXPECT_THROW(write_safetensors(folder.file("a"), {}, {{"scene", "\xe4.obj"}}), FileError);
-    EXPECT_TRUE(folder.empty());
+    EXPECT_THROW(write_safetensors(folder.path("a"), {}, {{"scene", "\xe4.obj"}}), FileError);
+    EXPECT_EQ(folder.count(), 0u);
 }
 
 TEST(Safetensors, AFullDiskIsOneErrorAndLeavesTheOldFile) {
     const TemporaryFolder folder;
     const std::vector<float> many(1 << 20);
-    write_safetensors(folder.file("a"), {}, {{"which", "old"}});
+    write_safetensors(folder.path("a"), {}, {{"which", "old"}});
 
     // The file size limit fails write(2) just as a full disk does, halfway through the tensor.
     rlimit unlimited = {};
@@ -149,15 +149,15 @@ TEST(Safetensors, AFullDiskIsOneErrorAndLeavesTheOldFile) {
     setrlimit(RLIMIT_FSIZE, &limited);
     const std::array tensors = {make_tensor<float>("many", {many.size()}, many)};
     const std::string message = message_of([&] {
-        write_safetensors(folder.file("a"), tensors, {{"which", "new"}});
+        write_safetensors(folder.path("a"), tensors, {{"which", "new"}});
     });
     setrlimit(RLIMIT_FSIZE, &unlimited);
     std::signal(SIGXFSZ, old_handler);
 
-    EXPECT_TRUE(message.starts_with(folder.file("a") + ": cannot be written: ")) << message;
-    EXPECT_EQ(SafetensorsFile(folder.file("a")).metadata("which"), "old");
-    std::filesystem::remove(folder.file("a"));
-    EXPECT_TRUE(folder.empty());
+    EXPECT_TRUE(message.starts_with(folder.path("a") + ": cannot be written: ")) << message;
+    EXPECT_EQ(SafetensorsFile(folder.path("a")).metadata("which"), "old");
+    std::filesystem::remove(folder.path("a"));
+    EXPECT_EQ(folder.count(), 0u);
 }
 
 TEST(Safetensors, AFullDeviceIsAnError) {
@@ -172,13 +172,13 @@ TEST(Safetensors, OpensInPlainNumPy) {
     auto tensors = sample.tensors();
     const std::vector<float> simple = {0.5f, 1.0f, 2.0f, 4.0f, 8.0f, 16.0f};
     tensors[0] = make_tensor<float>("points.position", {2, 3}, simple);
-    write_safetensors(folder.file("a"), tensors, sample.metadata);
+    write_safetensors(folder.path("a"), tensors, sample.metadata);
 
     const std::string command = AFTERGLOW_PYTHON " " AFTERGLOW_TESTS
                                                  "/transport/open_with_numpy.py "
-                                + folder.file("a") + " > " + folder.file("out");
+                                + folder.path("a") + " > " + folder.path("out");
     ASSERT_EQ(std::system(command.c_str()), 0);
-    EXPECT_EQ(file_bytes(folder.file("out")), "seed 42\n"
+    EXPECT_EQ(content_of(folder.path("out")), "seed 42\n"
                                               "points.position float32 2 3 31.5\n"
                                               "links.value float16 3 65503.5\n"
                                               "links.begin uint64 2 4503599627370496.0\n"
