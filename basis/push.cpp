@@ -55,20 +55,25 @@ PushOperator make_push_operator(const ShepardBasis& basis) {
     return {join_rows(std::move(rows))};
 }
 
-PullOperator::PullOperator(const PointHierarchy& points, const PushOperator& push, int levels)
+PullOperator::PullOperator(const PointHierarchy& points, const PushOperator& push, int levels,
+                           std::span<const float> area)
     : levels_(levels) {
     std::vector<std::vector<BasisEntry>> rows(points.end(levels - 1));
-    for (Index i = points.end(0); i < points.end(levels - 1); ++i) {
-        const auto index = push.parents.indices(i);
-        const auto weight = push.parents.values(i);
-        for (std::size_t e = 0; e < index.size(); ++e)
-            rows[index[e]].push_back({static_cast<std::uint32_t>(i), weight[e]});
-    }
-    for (auto& row : rows) {
-        float sum = 0.0f;
-        for (const BasisEntry& entry : row) sum += entry.value;
-        for (BasisEntry& entry : row) entry.value /= sum;
-    }
+    std::vector<double> mass(rows.size(), 0.0);
+    for (int l = levels - 1; l >= 0; --l)
+        for (Index i = points.begin(l); i < points.end(l); ++i) {
+            if (rows[i].empty()) mass[i] = area[i];
+            const auto index = push.parents.indices(i);
+            const auto weight = push.parents.values(i);
+            for (std::size_t e = 0; e < index.size(); ++e) {
+                const double share = mass[i] * weight[e];
+                if (!(share > 0.0)) continue;
+                rows[index[e]].push_back({static_cast<std::uint32_t>(i), static_cast<float>(share)});
+                mass[index[e]] += share;
+            }
+        }
+    for (std::size_t k = 0; k < rows.size(); ++k)
+        for (BasisEntry& entry : rows[k]) entry.value = static_cast<float>(entry.value / mass[k]);
     children_ = join_rows(std::move(rows));
 }
 

@@ -30,12 +30,19 @@ struct PushOperator {
 PushOperator make_push_operator(const ShepardBasis& basis);
 
 /// The *pull* of [LZT08, sec. 2.1]: band-limits values before they are differenced, so that each
-/// level carries averages. From fine to coarse, v_k = sum_c B_k(x_c) v_c / sum_c B_k(x_c) over the
-/// children c of k on the next finer level; a function without children keeps its own value.
+/// level carries averages. From fine to coarse, over the children c of k on the next finer level,
+///
+///     v_k = sum_c a_c B_k(x_c) v_c / sum_c a_c B_k(x_c),     a_k = sum_c a_c B_k(x_c),
+///
+/// where a_c is the area that a function of the finest level speaks for: unlike the unweighted mean
+/// it keeps the total, sum_k a_k v_k, from level to level. A function without children keeps its own
+/// value.
 class PullOperator {
 public:
-    /// For the levels [0, levels) of the points.
-    PullOperator(const PointHierarchy& points, const PushOperator& push, int levels);
+    /// For the levels [0, levels) of the points. area: of each function [world^2]; only those of
+    /// functions without children are used.
+    PullOperator(const PointHierarchy& points, const PushOperator& push, int levels,
+                 std::span<const float> area);
     /// In place; `channels` numbers a point.
     void pull(const PointHierarchy& points, int channels, std::span<float> values) const;
 

@@ -80,7 +80,9 @@ Hit Surface::closest_hit(const Ray& ray) const {
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
     const float facing = query.hit.Ng_x * ray.direction.x() + query.hit.Ng_y * ray.direction.y()
                          + query.hit.Ng_z * ray.direction.z();
-    return {query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v, facing > 0.0f};
+    const float length = std::hypot(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
+    return {query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v, facing > 0.0f,
+            std::abs(facing) / length};
 }
 
 void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const {
@@ -118,8 +120,11 @@ void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const
             const float facing = packet.hit.Ng_x[k] * packet.ray.dir_x[k]
                                  + packet.hit.Ng_y[k] * packet.ray.dir_y[k]
                                  + packet.hit.Ng_z[k] * packet.ray.dir_z[k];
+            const float length2 = packet.hit.Ng_x[k] * packet.hit.Ng_x[k]
+                                  + packet.hit.Ng_y[k] * packet.hit.Ng_y[k]
+                                  + packet.hit.Ng_z[k] * packet.hit.Ng_z[k];
             hit = {packet.ray.tfar[k], packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k],
-                   facing > 0.0f};
+                   facing > 0.0f,      std::abs(facing) / std::sqrt(length2)};
         }
     }
 }

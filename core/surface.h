@@ -21,6 +21,7 @@ struct Hit {
     std::uint32_t primitive = no_index;
     float u = 0, v = 0;      // barycentric weights of the triangle's second and third corner
     bool back_side = false;  // the ray came from the side that the triangle's winding calls back
+    float cosine = 1.0f;     // of the angle between the ray and the triangle's normal, >= 0
     explicit operator bool() const { return primitive != no_index; }
 };
 

@@ -48,7 +48,7 @@ void GatherDirections::deal(Index receiver, Eigen::Matrix3Xf& directions) const 
 
 void trace_gather(const Surface& surface, const PatchGrid& grid, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
-                  std::vector<GatherSample>& samples) {
+                  const Footprint& footprint, std::vector<GatherSample>& samples) {
     const int rays = directions.rays();
     samples.resize(static_cast<std::size_t>(end - begin) * rays);
     parallel_ranges(end - begin, 16, [&](Index first, Index last) {
@@ -67,6 +67,7 @@ void trace_gather(const Surface& surface, const PatchGrid& grid, const PointHier
                 const float pdf = vector_irradiance_pdf(local(2, k));
                 sample[k].weight = ray[k].direction / (static_cast<float>(EIGEN_PI) * pdf * rays);
                 sample[k].patch = hit[k] ? grid.patch_of(hit[k]) : no_index;
+                sample[k].level = hit[k] ? footprint.level(hit[k]) : 0.0f;
             }
         }
     });

@@ -6,15 +6,37 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 namespace afterglow {
 
-/// One ray of a hemispherical gather and what it adds: the patch it meets and omega / (pi pdf N).
+/// One ray of a hemispherical gather and what it adds.
 struct GatherSample {
-    Vec3 weight;         // direction times 1 / (pi pdf N); cosine not included
-    std::uint32_t patch; // no_index where the ray leaves the scene
+    Vec3 weight;         // omega / (pi pdf N): direction, no cosine
+    std::uint32_t patch; // what the ray meets; no_index where it leaves the scene
+    /// The sender level to look at, with a fraction: 0 the coarsest. Distant surfaces are seen
+    /// through coarse functions, see Footprint.
+    float level;
+};
+
+/// Which sender level a ray looks at: the finest whose spacing R_l is at least
+/// angle * distance / max(cos, 0.3), as a mip map would be read, blended linearly in log R. The angle
+/// is a constant of the operator, not of the ray count, so that receivers and their parents resolve
+/// alike.
+struct Footprint {
+    float angle = 0.05f;
+    float coarsest_spacing = 1.0f; // R_0 [world]
+    int levels = 1;
+
+    float level(const Hit& hit) const {
+        const float size = angle * hit.distance / std::max(hit.cosine, 0.3f);
+        return std::clamp(std::log2(coarsest_spacing / size), 0.0f, static_cast<float>(levels - 1));
+    }
 };
 
 /// Directions for the rays of many receivers, density (cos + 1/2) / (2 pi): one Sobol sequence under
@@ -37,7 +59,7 @@ private:
 /// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k].
 void trace_gather(const Surface& surface, const PatchGrid& grid, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
-                  std::vector<GatherSample>& samples);
+                  const Footprint& footprint, std::vector<GatherSample>& samples);
 
 /// A dense vector over the senders that knows which places are in use, in order.
 template <class Value>

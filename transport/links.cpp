@@ -25,10 +25,9 @@ LinkVector to_float(const LinkValue& v) {
 /// What a thread needs to turn samples into the row of a receiver.
 class RowMaker {
 public:
-    RowMaker(const PointHierarchy& points, const PushOperator& push, const SenderRows& rows,
-             int sender_levels)
-        : points_(points), push_(push), rows_(rows), sender_levels_(sender_levels),
-          link_(points.end(sender_levels - 1), LinkVector::Zero()),
+    RowMaker(const PointHierarchy& points, const PushOperator& push, const SenderRows& rows)
+        : points_(points), push_(push), rows_(rows), sender_levels_(rows.levels()),
+          link_(points.end(rows.levels() - 1), LinkVector::Zero()),
           ancestor_(points.size(), 0.0f) {}
 
     /// The kept links of receiver i on `level`. `done`: rows of all coarser levels.
@@ -42,12 +41,19 @@ public:
     }
 
 private:
+    void add(std::span<const BasisEntry> row, const LinkVector& weight) {
+        for (const BasisEntry& entry : row) link_.at(entry.index) += entry.value * weight;
+    }
+
     /// Raw links: first to sender values, then, by the transpose of push, to sender coefficients.
     void gather(std::span<const GatherSample> samples) {
         for (const GatherSample& s : samples) {
             if (s.patch == no_index) continue;
             const LinkVector weight(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
-            for (const BasisEntry& entry : rows_.row(s.patch)) link_.at(entry.index) += entry.value * weight;
+            const int level = static_cast<int>(s.level);
+            const float finer = s.level - static_cast<float>(level);
+            add(rows_.row(rows_.number(s.patch, level)), (1.0f - finer) * weight);
+            if (finer > 0.0f) add(rows_.row(rows_.number(s.patch, level + 1)), finer * weight);
         }
         for (int l = sender_levels_ - 1; l > 0; --l)
             link_.for_each(points_.begin(l), points_.end(l), [&](std::uint32_t j, const LinkVector& value) {
@@ -106,35 +112,42 @@ private:
 } // namespace
 
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
-                 SenderRows& rows, int sender_levels, const LinkOptions& options,
-                 LinkStatistics& statistics) {
-    constexpr Index batch = 2048, grain = 64;
+                 SenderRows& rows, const LinkOptions& options, LinkStatistics& statistics) {
+    constexpr Index samples_at_once = 1 << 20, grain = 16;
     std::vector<std::vector<LinkEntry>> done(points.size());
     std::vector<GatherSample> samples;
-    std::vector<std::uint32_t> patches;
+    std::vector<std::uint64_t> needed;
+    const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     for (int l = 0; l < points.levels(); ++l) {
-        const GatherDirections directions(l < sender_levels ? options.sender_rays : options.rays,
-                                          hash64(options.seed, static_cast<std::uint64_t>(l)));
+        const GatherDirections directions(
+            std::min(std::max(options.most_rays, options.rays), options.rays << (points.levels() - 1 - l)),
+            hash64(options.seed, static_cast<std::uint64_t>(l)));
         const float smallest = options.threshold * points.spacing[0] / points.spacing[l];
-        std::vector<std::uint64_t> before(static_cast<std::size_t>(batch / grain));
+        const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
+        std::vector<std::uint64_t> before(static_cast<std::size_t>((batch + grain - 1) / grain));
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
             auto start = Clock::now();
-            trace_gather(surface, rows.grid(), points, begin, end, points.begin(l), directions, samples);
+            trace_gather(surface, rows.grid(), points, begin, end, points.begin(l), directions,
+                         footprint, samples);
             statistics.trace_seconds += seconds_since(start);
             statistics.rays += samples.size();
 
             start = Clock::now();
-            patches.clear();
-            for (const GatherSample& s : samples)
-                if (s.patch != no_index) patches.push_back(s.patch);
-            rows.require(patches);
+            needed.clear();
+            for (const GatherSample& s : samples) {
+                if (s.patch == no_index) continue;
+                const int level = static_cast<int>(s.level);
+                needed.push_back(rows.number(s.patch, level));
+                if (s.level > static_cast<float>(level)) needed.push_back(rows.number(s.patch, level + 1));
+            }
+            rows.require(needed);
             statistics.rows_seconds += seconds_since(start);
 
             start = Clock::now();
             std::fill(before.begin(), before.end(), 0);
             parallel_ranges(end - begin, grain, [&](Index first, Index last) {
-                RowMaker maker(points, push, rows, sender_levels);
+                RowMaker maker(points, push, rows);
                 for (Index r = first; r < last; ++r)
                     maker.make(begin + r, l,
                                std::span(samples).subspan(static_cast<std::size_t>(r) * directions.rays(),

@@ -21,8 +21,9 @@ using LinkValue = std::array<Eigen::half, 3>;
 using Links = SparseRows<LinkValue>;
 
 struct LinkOptions {
-    int rays = 512;            // of a receiver on the finest level; a power of two
-    int sender_rays = 1024;    // of a receiver that is a sender point as well
+    int rays = 512; // of a receiver on the finest level; a power of two; twice as many a level up
+    int most_rays = 16384;
+    float footprint_angle = 0.05f; // see Footprint
     /// A link d is kept where |d| R_l / R_0 > threshold (R_l: spacing of the receiver's level). What
     /// is dropped of the coarsest senders goes onto those that stay, so that the response to uniform
     /// light stays exact.
@@ -39,7 +40,7 @@ struct LinkStatistics {
 
 /// Gathers, differences and thresholds the links of every receiver, level by level.
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
-                 SenderRows& rows, int sender_levels, const LinkOptions& options,
+                 SenderRows& rows, const LinkOptions& options,
                  LinkStatistics& statistics);
 
 } // namespace afterglow

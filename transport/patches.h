@@ -16,7 +16,7 @@ namespace afterglow {
 /// hit is a few operations away. Both sides of a cell have ids of their own: 2 * cell + back side.
 class PatchGrid {
 public:
-    /// size: largest length of a cell along the triangle's first two edges [world].
+    /// Keeps a reference. size: largest length of a cell along the triangle's first two edges [world].
     PatchGrid(const Scene& scene, float size);
 
     std::uint32_t patch_count() const { return count_; }
@@ -28,12 +28,21 @@ public:
     }
     /// The place that stands for a patch, as a hit on it.
     Hit center(std::uint32_t patch) const;
+    /// Area of the patch's part of its triangle [world^2].
+    float area(std::uint32_t patch) const;
 
 private:
     struct Cells {
         std::uint32_t first;
         std::uint16_t along_u, along_v;
     };
+    /// The triangle of a patch, and the patch's column and row in it.
+    struct Location {
+        std::uint32_t triangle, i, j;
+    };
+    Location locate(std::uint32_t patch) const;
+
+    const Scene& scene_;
     std::vector<Cells> cells_; // a triangle each
     std::uint32_t count_ = 0;
 };

@@ -26,9 +26,9 @@ void check(const PrecomputeOptions& options) {
                          + std::to_string(options.receiver_levels) + ")");
     if (!(options.coarse_radius >= 0.0f) || !std::isfinite(options.coarse_radius))
         throw UsageError("--coarse-radius must be positive");
-    for (const int rays : {options.links.rays, options.links.sender_rays})
-        if (rays < 16 || rays > 32768 || !std::has_single_bit(static_cast<unsigned>(rays)))
-            throw UsageError("--rays must be a power of two between 16 and 32768");
+    const int rays = options.links.rays;
+    if (rays < 16 || rays > 32768 || !std::has_single_bit(static_cast<unsigned>(rays)))
+        throw UsageError("--rays must be a power of two between 16 and 32768");
 }
 
 } // namespace
@@ -69,7 +69,8 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     SenderRows rows(surface, basis, options.sender_levels, patch_size);
     LinkOptions links = options.links;
     links.seed = options.seed;
-    transfer.links = make_links(surface, transfer.points, transfer.push, rows, options.sender_levels, links, r.links);
+    transfer.links = make_links(surface, transfer.points, transfer.push, rows, links, r.links);
+    transfer.area = rows.areas();
     r.total_seconds = seconds_since(start);
     return transfer;
 }

@@ -5,25 +5,25 @@
 
 namespace afterglow {
 
-SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int sender_levels,
-                       float patch_size)
-    : surface_(surface), basis_(basis), sender_levels_(sender_levels),
-      grid_(surface.scene(), patch_size), place_(grid_.patch_count()) {}
+SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_size)
+    : surface_(surface), basis_(basis), levels_(levels), grid_(surface.scene(), patch_size),
+      place_(static_cast<std::size_t>(grid_.patch_count()) * levels) {}
 
-void SenderRows::require(std::span<const std::uint32_t> patches) {
-    std::vector<std::uint32_t> missing;
-    for (const std::uint32_t p : patches)
-        if (place_[p].count == not_made) {
-            place_[p].count = 0; // listed once
-            missing.push_back(p);
+void SenderRows::require(std::span<const std::uint64_t> numbers) {
+    std::vector<std::uint64_t> missing;
+    for (const std::uint64_t number : numbers)
+        if (place_[number].count == not_made) {
+            place_[number].count = 0; // listed once
+            missing.push_back(number);
         }
     std::vector<std::vector<BasisEntry>> rows(missing.size());
     parallel_for(static_cast<Index>(missing.size()), [&](Index i) {
-        const SurfacePoint x = surface_.point(grid_.center(missing[i]));
-        // The finest level speaks for the patch; where it has no function, the next coarser does.
-        for (int l = sender_levels_ - 1; l >= 0 && rows[i].empty(); --l)
-            basis_.evaluate(l, x, rows[i]);
-        if (rows[i].empty()) basis_.evaluate_or_nearest(sender_levels_ - 1, x, rows[i]);
+        const auto patch = static_cast<std::uint32_t>(missing[i] / levels_);
+        const int level = static_cast<int>(missing[i] % levels_);
+        const SurfacePoint x = surface_.point(grid_.center(patch));
+        // Where the level has no function, the next coarser speaks for it.
+        for (int l = level; l >= 0 && rows[i].empty(); --l) basis_.evaluate(l, x, rows[i]);
+        if (rows[i].empty()) basis_.evaluate_or_nearest(level, x, rows[i]);
     });
     for (std::size_t i = 0; i < missing.size(); ++i) {
         place_[missing[i]] = {static_cast<std::uint32_t>(entries_.size()),
@@ -32,7 +32,27 @@ void SenderRows::require(std::span<const std::uint32_t> patches) {
         uncovered_ += rows[i].empty();
     }
     made_ += missing.size();
-    if (entries_.size() > 0xf0000000u) throw Error("too many sender rows; choose a larger --coarse-radius");
+    if (entries_.size() > 0xf0000000u)
+        throw Error("too many sender rows; choose a larger --coarse-radius");
+}
+
+std::vector<float> SenderRows::areas() const {
+    const PointHierarchy& points = basis_.points();
+    std::vector<double> sum(points.end(levels_ - 1), 0.0);
+    for (std::uint32_t patch = 0; patch < grid_.patch_count(); ++patch) {
+        const Place& p = place_[number(patch, levels_ - 1)];
+        if (p.count == not_made || p.count == 0) continue;
+        const double area = grid_.area(patch);
+        for (std::uint32_t e = p.begin; e < p.begin + p.count; ++e)
+            sum[entries_[e].index] += area * entries_[e].value;
+    }
+    // A function whose surroundings no ray met, or one of a coarser level that has no children, gets
+    // what its disk would have.
+    std::vector<float> areas(sum.size());
+    for (int l = 0; l < levels_; ++l)
+        for (std::uint32_t i = points.begin(l); i < points.end(l); ++i)
+            areas[i] = static_cast<float>(sum[i] > 0.0 ? sum[i] : points.spacing[l] * points.spacing[l]);
+    return areas;
 }
 
 } // namespace afterglow

@@ -9,25 +9,34 @@
 
 namespace afterglow {
 
-/// How the field of the senders looks from a surface patch: weights of sender *values* (see
-/// PushOperator) that sum to one. Made on demand, once a patch, at the patch's centre: two hits in
-/// one patch see the same row, which is what makes the gather fast.
+/// How the field of the senders looks from a surface patch: for each sender level, weights of sender
+/// *values* (see PushOperator) that sum to one. Made on demand, once a patch and level, at the
+/// patch's centre: all hits in a patch see the same row, which is what makes the gather fast.
 class SenderRows {
 public:
-    /// Senders are the levels [0, sender_levels) of the basis. Keeps references.
-    SenderRows(const Surface& surface, const ShepardBasis& basis, int sender_levels, float patch_size);
+    /// Senders are the levels [0, levels) of the basis. Keeps references.
+    SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_size);
 
     const PatchGrid& grid() const { return grid_; }
-    /// Makes the rows of these patches (repetitions allowed); not to be called concurrently.
-    void require(std::span<const std::uint32_t> patches);
-    /// The row of a patch that was required; empty where no function sees it.
-    std::span<const BasisEntry> row(std::uint32_t patch) const {
-        const Place& p = place_[patch];
+    int levels() const { return levels_; }
+
+    /// A patch seen at a level: the row of (patch, level) is number patch * levels() + level.
+    std::uint64_t number(std::uint32_t patch, int level) const {
+        return static_cast<std::uint64_t>(patch) * levels_ + level;
+    }
+    /// Makes these rows (repetitions allowed); not to be called concurrently.
+    void require(std::span<const std::uint64_t> numbers);
+    /// A row that was required; empty where no function sees the patch.
+    std::span<const BasisEntry> row(std::uint64_t number) const {
+        const Place& p = place_[number];
         return {entries_.data() + p.begin, p.count};
     }
+    /// Area that each function of the finest level speaks for, from the patches that were met on
+    /// that level; of the level's mean where it was not [world^2]. A number a sender.
+    std::vector<float> areas() const;
+
     std::size_t made() const { return made_; }
     std::size_t uncovered() const { return uncovered_; } // rows that are empty
-    std::size_t bytes() const { return entries_.size() * sizeof(BasisEntry) + place_.size() * sizeof(Place); }
 
 private:
     struct Place {
@@ -36,7 +45,7 @@ private:
     static constexpr std::uint32_t not_made = ~0u;
     const Surface& surface_;
     const ShepardBasis& basis_;
-    int sender_levels_;
+    int levels_;
     PatchGrid grid_;
     std::vector<Place> place_;
     std::vector<BasisEntry> entries_;

@@ -8,7 +8,7 @@
 namespace afterglow {
 
 LightTransport::LightTransport(const TransferOperator& transfer)
-    : transfer_(transfer), pull_(transfer.points, transfer.push, transfer.sender_levels) {}
+    : transfer_(transfer), pull_(transfer.points, transfer.push, transfer.sender_levels, transfer.area) {}
 
 Radiosity LightTransport::direct_radiosity(const Surface& surface, const Spotlight& light) const {
     const PointHierarchy& points = transfer_.points;

@@ -18,6 +18,7 @@ struct TransferOperator {
     PointHierarchy points;
     int sender_levels = 0;
     PushOperator push;
+    std::vector<float> area; // that a sender speaks for [world^2], see PullOperator
     Links links;
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
