@@ -20,7 +20,7 @@ namespace afterglow {
 namespace {
 
 struct ReferenceCommand {
-    std::string scene, output, points, layer = "indirect", report;
+    std::string scene, output, points, layer = "indirect", report, strategy = "plain";
     Spotlight light;
     Camera camera;
     Index samples = 256;
@@ -48,7 +48,7 @@ std::map<std::string, std::string> provenance(const ReferenceCommand& command, c
                                               const Achieved& achieved) {
     const Spotlight& light = command.light;
     return {{"afterglow.version", AFTERGLOW_VERSION},
-            {"afterglow.algorithm", "path tracing"},
+            {"afterglow.algorithm", "path tracing, " + command.strategy},
             {"afterglow.scene", scene.name},
             {"afterglow.scene_hash", scene.content_hash()},
             {"afterglow.seed", std::to_string(command.run.seed)},
@@ -103,6 +103,7 @@ Achieved trace_picture(const ReferenceCommand& command, const Surface& surface,
 void run(ReferenceCommand& command, bool has_camera) {
     command.light.check();
     layer_from_name(command.layer);
+    strategy_from_name(command.strategy);
     if (command.points.empty()) {
         if (!has_camera)
             throw UsageError("reference needs --camera-position and --camera-target, or --points");
@@ -122,6 +123,7 @@ void run(ReferenceCommand& command, bool has_camera) {
         options.samples = command.samples;
         options.target_error = command.target_error;
         options.seed = command.run.seed;
+        options.strategy = strategy_from_name(command.strategy);
         options.progress = [&](double share) { progress.update(share); };
         achieved = command.points.empty() ? trace_picture(command, surface, options)
                                           : trace_points(command, surface, options);
@@ -159,6 +161,10 @@ void add_reference_command(CLI::App& app) {
     add_number(*sub, "--target-error", command->target_error,
                "Instead: trace until the relative standard error is below this share, such as 0.02")
         ->excludes(samples);
+    sub->add_option(
+        "--strategy", command->strategy,
+        "plain, or connected: also joins paths to rays from the light, less noise a path for "
+        "more time (default plain)");
     sub->add_option("--report", command->report, "JSON file for samples, rays, time and error");
     add_light_options(*sub, command->light);
     add_camera_options(*sub, command->camera);

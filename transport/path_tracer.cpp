@@ -3,15 +3,19 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
+#include "transport/light_vertices.h"
+#include "transport/mean_estimator.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace afterglow {
 namespace {
 
-constexpr std::size_t block_size = 64; // paths that advance together, for packets of rays
+constexpr std::size_t block_size = 64;           // paths that advance together, for packets of rays
+constexpr std::uint64_t connected_depths = 1000; // vertices that are joined with light vertices
 
 /// Where a path starts, and the factor from its irradiance to what is asked.
 struct PathStart {
@@ -24,53 +28,130 @@ struct Path {
     SurfacePoint x;
     Rgb weight, throughput;
     std::uint32_t index;
+    std::uint32_t slot; // of the light vertices it is joined with
 };
 
-/// Follows at most block_size paths to their ends and adds what they gather of light l to sums[l].
-/// Returns the number of rays.
-std::uint64_t trace_paths(const Surface& surface, std::span<const Spotlight> lights,
-                          std::uint64_t seed, std::span<const PathStart> starts,
-                          std::span<Eigen::Array3d> sums) {
-    std::array<Path, block_size> paths;
-    std::array<Ray, block_size> rays;
-    std::array<Hit, block_size> hits;
-    std::size_t alive = 0;
-    for (const PathStart& start : starts)
-        paths[alive++] = {start.x, start.weight, Rgb::Ones(), start.index};
-
-    std::uint64_t ray_count = 0;
-    for (std::uint64_t depth = 0; alive > 0; ++depth) {
-        const std::uint64_t bounce_seed = hash64(seed, depth);
-        for (std::size_t k = 0; k < alive; ++k) {
-            const Path& path = paths[k];
-            const Vec3 local = sample_cosine(shuffled_sobol2(path.index, bounce_seed));
-            rays[k] = {surface.lifted(path.x), Frame(path.x.normal).to_world(local)};
-        }
-        surface.closest_hits({rays.data(), alive}, {hits.data(), alive});
-        ray_count += alive;
-
-        std::size_t survivors = 0;
-        for (std::size_t k = 0; k < alive; ++k) {
-            if (!hits[k]) continue;
-            Path path = paths[k];
-            path.x = surface.point(hits[k]);
-            path.throughput *= surface.reflectance(hits[k]);
-            for (std::size_t l = 0; l < lights.size(); ++l) {
-                const Rgb unoccluded = unoccluded_irradiance(lights[l], path.x);
-                if ((unoccluded == 0.0f).all()) continue;
-                ++ray_count;
-                if (surface.blocked(surface.lifted(path.x), lights[l].position)) continue;
-                sums[l] += (path.weight * path.throughput * unoccluded).cast<double>();
-            }
-            // Below one, so that even a scene of reflectance one lets every path end.
-            const float survival = std::min(0.999f, path.throughput.maxCoeff());
-            if (Rng(bounce_seed, path.index).uniform() >= survival) continue;
-            path.throughput /= survival;
-            paths[survivors++] = path;
-        }
-        alive = survivors;
+/// The lights, and what joining paths to their rays needs.
+class PathTracer {
+public:
+    PathTracer(const Surface& surface, std::span<const Spotlight> lights, PathStrategy strategy)
+        : surface_(surface), lights_(lights) {
+        if (strategy == PathStrategy::connected)
+            for (const Spotlight& light : lights)
+                samplers_.emplace_back(light);
     }
-    return ray_count;
+
+    /// Memory for trace(), one at a time.
+    struct Workspace {
+        std::array<Path, block_size> paths;
+        std::array<Ray, block_size> rays;
+        std::array<Hit, block_size> hits;
+        std::vector<LightVertex> vertices; // [light][slot]
+    };
+
+    /// Follows at most block_size paths to their ends and adds what they gather of light l to
+    /// sums[l]. Returns the number of rays.
+    std::uint64_t trace(std::uint64_t seed, std::span<const PathStart> starts,
+                        std::span<Eigen::Array3d> sums, Workspace& work) const {
+        std::size_t alive = 0;
+        for (const PathStart& start : starts) {
+            const auto slot = static_cast<std::uint32_t>(alive);
+            work.paths[alive++] = {start.x, start.weight, Rgb::Ones(), start.index, slot};
+        }
+        std::uint64_t rays = connected() ? trace_from_lights(seed, starts, work) : 0;
+        for (std::uint64_t depth = 0; alive > 0; ++depth) {
+            const std::uint64_t bounce_seed = hash64(seed, depth);
+            for (std::size_t k = 0; k < alive; ++k) {
+                const Path& path = work.paths[k];
+                if (connected() && depth < connected_depths) rays += connect(path, sums, work);
+                const Vec3 local = sample_cosine(shuffled_sobol2(path.index, bounce_seed));
+                work.rays[k] = {surface_.lifted(path.x), Frame(path.x.normal).to_world(local)};
+            }
+            surface_.closest_hits({work.rays.data(), alive}, {work.hits.data(), alive});
+            rays += alive;
+
+            std::size_t survivors = 0;
+            for (std::size_t k = 0; k < alive; ++k) {
+                const Hit& hit = work.hits[k];
+                if (!hit) continue;
+                Path path = work.paths[k];
+                const SurfacePoint from = std::exchange(path.x, surface_.point(hit));
+                path.throughput *= surface_.reflectance(hit);
+                rays += add_direct_light(path, from, hit, depth, sums);
+                // Below one, so that even a scene of reflectance one lets every path end.
+                const float survival = std::min(0.999f, path.throughput.maxCoeff());
+                if (Rng(bounce_seed, path.index).uniform() >= survival) continue;
+                path.throughput /= survival;
+                work.paths[survivors++] = path;
+            }
+            alive = survivors;
+        }
+        return rays;
+    }
+
+private:
+    bool connected() const { return !samplers_.empty(); }
+
+    /// Next-event estimation at the vertex that a path has just reached.
+    std::uint64_t add_direct_light(const Path& path, const SurfacePoint& from, const Hit& hit,
+                                   std::uint64_t depth, std::span<Eigen::Array3d> sums) const {
+        std::uint64_t rays = 0;
+        for (std::size_t l = 0; l < lights_.size(); ++l) {
+            const Rgb unoccluded = unoccluded_irradiance(lights_[l], path.x);
+            if ((unoccluded == 0.0f).all()) continue;
+            ++rays;
+            if (surface_.blocked(surface_.lifted(path.x), lights_[l].position)) continue;
+            float share = 1.0f;
+            if (connected() && depth < connected_depths) {
+                const Vec3 normal = surface_.geometric_normal(hit);
+                const float pdf =
+                    light_vertex_pdf(samplers_[l], lights_[l], path.x.position, normal);
+                share = cosine_share(from, path.x.position, normal, pdf);
+            }
+            sums[l] += (path.weight * path.throughput * unoccluded * share).cast<double>();
+        }
+        return rays;
+    }
+
+    std::uint64_t trace_from_lights(std::uint64_t seed, std::span<const PathStart> starts,
+                                    Workspace& work) const {
+        constexpr std::uint64_t light_dimension = 0x6c696768; // beyond any bounce of a path
+        std::array<std::uint32_t, block_size> indices;
+        for (std::size_t k = 0; k < starts.size(); ++k)
+            indices[k] = starts[k].index;
+        work.vertices.resize(block_size * lights_.size());
+        for (std::size_t l = 0; l < lights_.size(); ++l)
+            trace_light_vertices(surface_, lights_[l], samplers_[l],
+                                 hash64(seed, light_dimension + l), {indices.data(), starts.size()},
+                                 {&work.vertices[block_size * l], starts.size()});
+        return starts.size() * lights_.size();
+    }
+
+    /// Joins a path's last vertex with the light vertices of its slot.
+    std::uint64_t connect(const Path& path, std::span<Eigen::Array3d> sums,
+                          const Workspace& work) const {
+        std::uint64_t rays = 0;
+        for (std::size_t l = 0; l < lights_.size(); ++l) {
+            const LightVertex& y = work.vertices[block_size * l + path.slot];
+            if ((y.radiosity == 0.0f).all()) continue;
+            const Vec3 to_y = y.x.position - path.x.position;
+            if (to_y.dot(path.x.normal) <= 0.0f || to_y.dot(y.geometric_normal) >= 0.0f) continue;
+            ++rays;
+            if (surface_.blocked(surface_.lifted(path.x), surface_.lifted(y.x))) continue;
+            const float share = cosine_share(path.x, y.x.position, y.geometric_normal, y.pdf);
+            sums[l] += (path.weight * path.throughput * y.radiosity * share).cast<double>();
+        }
+        return rays;
+    }
+
+    const Surface& surface_;
+    std::span<const Spotlight> lights_;
+    std::vector<ConeSampler> samplers_; // one a light; none in plain path tracing
+};
+
+EstimatorOptions estimator_options(const PathTracerOptions& options) {
+    return {options.samples, options.target_error, options.max_samples,
+            options.batches, options.seed,         options.progress};
 }
 
 } // namespace
@@ -80,20 +161,23 @@ IrradianceEstimate estimate_irradiance(const Surface& surface, std::span<const S
                                        const PathTracerOptions& options) {
     const auto point_count = static_cast<Index>(points.size());
     const auto light_count = static_cast<Index>(lights.size());
+    const PathTracer tracer(surface, lights, options.strategy);
     const Sampler sampler = [&](Index item, std::uint64_t seed, Index first, Index count,
                                 std::span<Eigen::Array3d> sums) {
         std::array<PathStart, block_size> starts;
+        PathTracer::Workspace work;
         std::uint64_t rays = 0;
         for (Index done = 0; done < count;) {
             std::size_t used = 0;
             for (; used < block_size && done < count; ++used, ++done)
                 starts[used] = {points[static_cast<std::size_t>(item)], Rgb::Ones(),
                                 static_cast<std::uint32_t>(first + done)};
-            rays += trace_paths(surface, lights, seed, {starts.data(), used}, sums);
+            rays += tracer.trace(seed, {starts.data(), used}, sums, work);
         }
         return rays;
     };
-    MeanEstimate means = estimate_means(point_count, light_count, sampler, options);
+    MeanEstimate means =
+        estimate_means(point_count, light_count, sampler, estimator_options(options));
 
     IrradianceEstimate result;
     result.indirect = std::move(means.mean);
@@ -108,6 +192,16 @@ IrradianceEstimate estimate_irradiance(const Surface& surface, std::span<const S
                               points[static_cast<std::size_t>(k / light_count)]);
     });
     return result;
+}
+
+PathStrategy strategy_from_name(std::string_view name) {
+    for (const PathStrategy strategy : {PathStrategy::plain, PathStrategy::connected})
+        if (name == strategy_name(strategy)) return strategy;
+    throw UsageError("unknown strategy '" + std::string(name) + "'; there are plain and connected");
+}
+
+std::string strategy_name(PathStrategy strategy) {
+    return strategy == PathStrategy::plain ? "plain" : "connected";
 }
 
 Layer layer_from_name(std::string_view name) {
@@ -139,6 +233,7 @@ PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
     const bool wants_direct = layer == Layer::direct || layer == Layer::full;
     const bool wants_indirect = layer != Layer::direct;
 
+    const PathTracer tracer(surface, {&light, 1}, options.strategy);
     const Sampler sampler = [&](Index item, std::uint64_t seed, Index first, Index count,
                                 std::span<Eigen::Array3d> sums) {
         const auto left = static_cast<float>(item % camera.width);
@@ -146,6 +241,7 @@ PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
         std::array<Ray, block_size> rays;
         std::array<Hit, block_size> hits;
         std::array<PathStart, block_size> starts;
+        PathTracer::Workspace work;
         std::uint64_t ray_count = 0;
         for (Index done = 0; done < count;) {
             std::array<std::uint32_t, block_size> index;
@@ -171,8 +267,7 @@ PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
                 sums[0] +=
                     (weight * direct_irradiance(surface, light, starts[seen - 1].x)).cast<double>();
             }
-            if (wants_indirect)
-                ray_count += trace_paths(surface, {&light, 1}, seed, {starts.data(), seen}, sums);
+            if (wants_indirect) ray_count += tracer.trace(seed, {starts.data(), seen}, sums, work);
         }
         return ray_count;
     };
@@ -185,7 +280,7 @@ PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
     });
     const double to_all = std::sqrt(static_cast<double>(pixel_count)
                                     / static_cast<double>(std::max<Index>(1, covered)));
-    PathTracerOptions all = options;
+    EstimatorOptions all = estimator_options(options);
     all.target_error *= to_all;
     const MeanEstimate means = estimate_means(pixel_count, 1, sampler, all);
 

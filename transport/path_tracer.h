@@ -4,11 +4,10 @@
 #include "core/image.h"
 #include "core/surface.h"
 #include "core/types.h"
-#include "transport/mean_estimator.h"
 #include "transport/spotlight.h"
 
 #include <cstdint>
-#include <optional>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -16,7 +15,25 @@
 
 namespace afterglow {
 
-using PathTracerOptions = EstimatorOptions;
+enum class PathStrategy {
+    plain,     // next-event estimation alone: the simplest thing that is right
+    connected, // also joins each vertex with the end of a ray from each light: less noise
+};
+
+/// "plain", "connected". Throws UsageError for another name.
+PathStrategy strategy_from_name(std::string_view name);
+std::string strategy_name(PathStrategy strategy);
+
+/// The numbers of samples are explained at EstimatorOptions (mean_estimator.h).
+struct PathTracerOptions {
+    Index samples = 1024;
+    double target_error = 0.0;
+    Index max_samples = 1 << 22;
+    int batches = 16;
+    std::uint64_t seed = 1;
+    PathStrategy strategy = PathStrategy::plain;
+    std::function<void(double)> progress = {};
+};
 
 /// Irradiance [W/m^2] at P points under L lights; column p * L + l belongs to point p and light l.
 /// Cosine included, the receiver's own reflectance and 1/pi not.

@@ -14,7 +14,7 @@ namespace afterglow {
 namespace {
 
 struct Common {
-    std::string scenes, lights;
+    std::string scenes, lights, strategy = "plain";
     std::vector<std::string> names;
     ReferenceOptions reference;
     int threads = 0;
@@ -33,6 +33,7 @@ void add_common_options(CLI::App& command, Common& common) {
                        "Relative standard error of each light's reference");
     command.add_option("--max-samples", common.reference.max_samples,
                        "Mean paths a point at which tracing gives up");
+    command.add_option("--strategy", common.strategy, "Of the path tracer: plain or connected");
     command.add_option("--threads", common.threads, "Threads to use (0: all processors)");
 }
 
@@ -65,6 +66,7 @@ void run_references(const Common& common) {
         const Surface surface(scene);
         Progress progress(name, true);
         ReferenceOptions options = common.reference;
+        options.tracer.strategy = strategy_from_name(common.strategy);
         options.tracer.progress = [&](double share) { progress.update(share); };
         print_reference(described, accuracy_reference(surface, described, options));
     }

@@ -1,0 +1,168 @@
+#include "core/image.h"
+#include "tests/support/temporary_folder.h"
+#include "transport/csv_points.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <sys/wait.h>
+
+// Runs the program itself, whose path is AFTERGLOW_PROGRAM.
+
+namespace afterglow {
+namespace {
+
+struct Outcome {
+    int status = -1;
+    std::string out, err;
+};
+
+std::string content(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Outcome run(const std::string& arguments) {
+    const TemporaryFolder streams;
+    const std::string command = std::string("'") + AFTERGLOW_PROGRAM + "' " + arguments + " >'"
+                                + streams.path("out") + "' 2>'" + streams.path("err")
+                                + "' </dev/null";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(streams.path("out")),
+            content(streams.path("err"))};
+}
+
+const std::string light = " --light-position 0.278,0.54,0.28 --light-direction 0,-1,0"
+                          " --light-cone 40,45 --light-intensity 1,1,1";
+const std::string camera = " --camera-position 0.278,0.273,-0.8 --camera-target 0.278,0.273,0"
+                           " --camera-fov 38 --size 16x12";
+
+/// An error is one line that says who speaks.
+void expect_failure(const Outcome& run, int status) {
+    EXPECT_EQ(run.status, status) << run.err;
+    EXPECT_EQ(run.out, "");
+    EXPECT_TRUE(run.err.starts_with("afterglow: ")) << run.err;
+    EXPECT_EQ(run.err.find('\n'), run.err.size() - 1) << run.err;
+}
+
+TEST(CommandLine, ToldToHelpItDoes) {
+    for (const char* arguments : {"--help", "reference --help", "compare --help", "--version"}) {
+        const Outcome help = run(arguments);
+        EXPECT_EQ(help.status, 0);
+        EXPECT_NE(help.out, "");
+        EXPECT_EQ(help.err, "");
+    }
+}
+
+TEST(CommandLine, WrongUsageIsStatusTwo) {
+    const TemporaryFolder folder;
+    const std::string picture = "-o '" + folder.path("a.exr") + "'";
+    const std::string good = "reference builtin:cornell " + picture + light + camera;
+    for (const std::string& arguments :
+         {std::string(),
+          std::string("frobnicate"),
+          std::string("reference"),
+          good + " --frobnicate",
+          good + " --layer glossy",
+          good + " --strategy lucky",
+          good + " --spp 0",
+          good + " --spp 4 --target-error 0.1",
+          good + " --target-error 0",
+          good + " --target-error nan",
+          good + " --threads -1",
+          good + " --size 0x5",
+          good + " --size 16",
+          good + " --camera-fov 180",
+          good + " --camera-up 0,0,1",
+          "reference builtin:nowhere " + picture + light + camera,
+          "reference builtin:cornell " + picture + light,
+          "reference builtin:cornell " + picture + camera,
+          "reference builtin:cornell " + picture + camera
+              + " --light-position 0,0 --light-direction 0,-1,0",
+          "reference builtin:cornell " + picture + camera
+              + " --light-position 0,0,x --light-direction 0,-1,0",
+          "reference builtin:cornell " + picture + camera
+              + " --light-position 0,0,inf --light-direction 0,-1,0",
+          "reference builtin:cornell " + picture + camera
+              + " --light-position 0,0,0 --light-direction 0,0,0",
+          "reference builtin:cornell " + picture + camera
+              + " --light-position 0,0,0 --light-direction 0,-1,0 --light-cone 50,40",
+          "reference builtin:cornell " + picture + camera
+              + " --light-position 0,0,0 --light-direction 0,-1,0 --light-intensity -1,0,0",
+          std::string("compare a.exr b.csv"),
+          std::string("compare a.exr")}) {
+        SCOPED_TRACE(arguments);
+        expect_failure(run(arguments), 2);
+    }
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST(CommandLine, FaultsOfFilesAreStatusOneAndLeaveNothingBehind) {
+    const TemporaryFolder folder, inputs;
+    const std::string bad = inputs.write("bad.csv", "0.1,0.2,0.3,0,1,0\n1,2\n");
+    const std::string values = inputs.write("e.csv", "1,2,3\n");
+    const std::string more = inputs.write("f.csv", "1,2,3\n4,5,6\n");
+    const std::string picture = " -o '" + folder.path("a.exr") + "'";
+    const std::string table = " -o '" + folder.path("a.csv") + "'";
+    for (const std::string& arguments :
+         {"reference '" + folder.path("none.obj") + "'" + picture + light + camera,
+          "reference builtin:cornell --quiet --points '" + bad + "'" + table + light,
+          "reference builtin:cornell --quiet --points '" + folder.path("none.csv") + "'" + table
+              + light,
+          "reference builtin:cornell --quiet --spp 2 -o '" + folder.path("no/such/a.exr") + "'"
+              + light + camera,
+          "compare '" + folder.path("a.exr") + "' '" + folder.path("b.exr") + "'",
+          "compare '" + values + "' '" + more + "'"}) {
+        SCOPED_TRACE(arguments);
+        expect_failure(run(arguments), 1);
+    }
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST(CommandLine, ReferencePictureCarriesItsProvenanceAndEqualsItself) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path("a.exr");
+    const Outcome made = run("reference builtin:cornell --spp 32 --report '" + folder.path("r.json")
+                             + "' -o '" + path + "'" + light + camera);
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_EQ(made.out, "");
+    EXPECT_NE(made.err.find("relative standard error"), std::string::npos);
+    const Image image = read_exr(path);
+    EXPECT_EQ(image.width, 16);
+    EXPECT_EQ(image.height, 12);
+    for (const char* name : {"afterglow.version", "afterglow.seed", "afterglow.scene_hash",
+                             "afterglow.relative_standard_error"})
+        EXPECT_TRUE(image.attributes.contains(name)) << name;
+    EXPECT_NE(content(folder.path("r.json")).find("\"relative_standard_error\""),
+              std::string::npos);
+
+    const Outcome same = run("compare --json '" + path + "' '" + path + "'");
+    EXPECT_EQ(same.status, 0) << same.err;
+    EXPECT_NE(same.out.find("\"rel_rmse\":0.0"), std::string::npos) << same.out;
+    EXPECT_NE(same.out.find("\"reference_standard_error\":"), std::string::npos) << same.out;
+    EXPECT_EQ(same.out.find('\n'), same.out.size() - 1);
+}
+
+TEST(CommandLine, ReferencePointsAreTheSameOnAnyNumberOfThreads) {
+    const TemporaryFolder folder;
+    const std::string points =
+        folder.write("points.csv", "x,y,z,nx,ny,nz\n0.1,0,0.1,0,1,0\n0.5,0.3,0.559,0,0,-1\n");
+    const auto irradiance = [&](const std::string& options) {
+        const std::string path = folder.path("e.csv");
+        const Outcome made = run("reference builtin:cornell --quiet --points '" + points + "' -o '"
+                                 + path + "'" + light + options);
+        EXPECT_EQ(made.status, 0) << made.err;
+        EXPECT_EQ(made.err, "");
+        return content(path);
+    };
+    const std::string one = irradiance(" --spp 64 --threads 1");
+    EXPECT_EQ(one, irradiance(" --spp 64 --threads 2"));
+    EXPECT_NE(one, irradiance(" --spp 64 --seed 2"));
+    EXPECT_EQ(read_irradiance_csv(folder.path("e.csv")).cols(), 2);
+}
+
+} // namespace
+} // namespace afterglow
