@@ -89,7 +89,7 @@ TEST_P(Furnace, IndirectIrradianceInAClosedSphereIsUniformAndFollowsFromTheFlux)
     const std::vector<SurfacePoint> points = points_by_area(scene, 64, 3);
     const IrradianceEstimate estimate =
         estimate_irradiance(surface, {&light, 1}, points,
-                            {.samples = rho > 0.9 ? 2048 : 4096, .seed = 5, .strategy = strategy});
+                            {.samples = rho > 0.9 ? 2304 : 4096, .seed = 5, .strategy = strategy});
 
     const double exact = rho / (1.0 - rho) * flux(light) / (4.0 * pi);
     const double error =
