@@ -14,8 +14,7 @@
 namespace afterglow {
 namespace {
 
-constexpr std::size_t block_size = 64;           // paths that advance together, for packets of rays
-constexpr std::uint64_t connected_depths = 1000; // vertices that are joined with light vertices
+constexpr std::size_t block_size = 64; // paths that advance together, for packets of rays
 
 /// Where a path starts, and the factor from its irradiance to what is asked.
 struct PathStart {
@@ -63,7 +62,7 @@ public:
             const std::uint64_t bounce_seed = hash64(seed, depth);
             for (std::size_t k = 0; k < alive; ++k) {
                 const Path& path = work.paths[k];
-                if (connected() && depth < connected_depths) rays += connect(path, sums, work);
+                if (connected()) rays += connect(path, sums, work);
                 const Vec3 local = sample_cosine(shuffled_sobol2(path.index, bounce_seed));
                 work.rays[k] = {surface_.lifted(path.x), Frame(path.x.normal).to_world(local)};
             }
@@ -77,7 +76,7 @@ public:
                 Path path = work.paths[k];
                 const SurfacePoint from = std::exchange(path.x, surface_.point(hit));
                 path.throughput *= surface_.reflectance(hit);
-                rays += add_direct_light(path, from, hit, depth, sums);
+                rays += add_direct_light(path, from, hit, sums);
                 // Below one, so that even a scene of reflectance one lets every path end.
                 const float survival = std::min(0.999f, path.throughput.maxCoeff());
                 if (Rng(bounce_seed, path.index).uniform() >= survival) continue;
@@ -94,7 +93,7 @@ private:
 
     /// Next-event estimation at the vertex that a path has just reached.
     std::uint64_t add_direct_light(const Path& path, const SurfacePoint& from, const Hit& hit,
-                                   std::uint64_t depth, std::span<Eigen::Array3d> sums) const {
+                                   std::span<Eigen::Array3d> sums) const {
         std::uint64_t rays = 0;
         for (std::size_t l = 0; l < lights_.size(); ++l) {
             const Rgb unoccluded = unoccluded_irradiance(lights_[l], path.x);
@@ -102,7 +101,7 @@ private:
             ++rays;
             if (surface_.blocked(surface_.lifted(path.x), lights_[l].position)) continue;
             float share = 1.0f;
-            if (connected() && depth < connected_depths) {
+            if (connected()) {
                 const Vec3 normal = surface_.geometric_normal(hit);
                 const float pdf =
                     light_vertex_pdf(samplers_[l], lights_[l], path.x.position, normal);
