@@ -1,19 +1,19 @@
 #include "transport/command_reference.h"
 
 #include "core/error.h"
-#include "core/file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "transport/cli_options.h"
 #include "transport/csv_points.h"
 #include "transport/path_tracer.h"
+#include "transport/provenance.h"
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
+#include <map>
 #include <memory>
 
 namespace afterglow {
@@ -34,32 +34,19 @@ struct Achieved {
     std::uint64_t samples = 0, rays = 0;
 };
 
-std::string number_text(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value);
-    return text;
-}
-
-std::string vector_text(const Eigen::Ref<const Vec3>& v) {
-    return number_text(v.x()) + "," + number_text(v.y()) + "," + number_text(v.z());
-}
-
 std::map<std::string, std::string> provenance(const ReferenceCommand& command, const Scene& scene,
                                               const Achieved& achieved) {
-    const Spotlight& light = command.light;
-    return {{"afterglow.version", AFTERGLOW_VERSION},
-            {"afterglow.algorithm", "path tracing, " + command.strategy},
-            {"afterglow.scene", scene.name},
-            {"afterglow.scene_hash", scene.content_hash()},
-            {"afterglow.seed", std::to_string(command.run.seed)},
-            {"afterglow.layer", command.points.empty() ? command.layer : "irradiance"},
-            {"afterglow.light_position", vector_text(light.position)},
-            {"afterglow.light_direction", vector_text(light.direction)},
-            {"afterglow.light_cone",
-             number_text(light.inner_angle) + "," + number_text(light.outer_angle)},
-            {"afterglow.light_intensity", vector_text(light.intensity.matrix())},
-            {"afterglow.samples", std::to_string(achieved.samples)},
-            {"afterglow.relative_standard_error", number_text(achieved.relative_error)}};
+    std::map<std::string, std::string> attributes = light_attributes(command.light);
+    attributes.merge(std::map<std::string, std::string>{
+        {"afterglow.version", AFTERGLOW_VERSION},
+        {"afterglow.algorithm", "path tracing, " + command.strategy},
+        {"afterglow.scene", scene.name},
+        {"afterglow.scene_hash", scene.content_hash()},
+        {"afterglow.seed", std::to_string(command.run.seed)},
+        {"afterglow.layer", command.points.empty() ? command.layer : "irradiance"},
+        {"afterglow.samples", std::to_string(achieved.samples)},
+        {"afterglow.relative_standard_error", number_text(achieved.relative_error)}});
+    return attributes;
 }
 
 void write_report(const std::string& path, const ReferenceCommand& command, const Scene& scene,
@@ -72,12 +59,7 @@ void write_report(const std::string& path, const ReferenceCommand& command, cons
     report["rays"] = achieved.rays;
     report["seconds"] = achieved.seconds;
     report["rays_per_second"] = static_cast<double>(achieved.rays) / achieved.seconds;
-    write_atomically(path, [&](const std::string& temporary) {
-        std::ofstream file(temporary);
-        file << report.dump(1) << '\n';
-        file.close();
-        if (!file) throw FileError(path, "cannot be written");
-    });
+    write_text(path, report.dump(1) + "\n");
 }
 
 Achieved trace_points(const ReferenceCommand& command, const Surface& surface,

@@ -85,13 +85,27 @@ Radiosity LightTransport::all_bounces(const Radiosity& direct, double tolerance,
     return result.solution;
 }
 
+Radiosity LightTransport::some_bounces(const Radiosity& direct, int count) const {
+    Radiosity last = direct, sum = direct;
+    for (int k = 1; k < count; ++k) {
+        last = bounce(last);
+        for (std::size_t m = 0; m < sum.size(); ++m) sum[m] += last[m];
+    }
+    return sum;
+}
+
 VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
     return apply_links(coefficients(radiosity), transfer_.points.levels());
 }
 
 VectorIrradiance LightTransport::indirect(const Surface& surface, const Spotlight& light,
                                           NeumannStatistics* statistics) const {
-    return gather(all_bounces(direct_radiosity(surface, light), 2e-3, statistics));
+    const Radiosity direct = direct_radiosity(surface, light);
+    if (transfer_.bounces > 0) {
+        if (statistics) *statistics = {transfer_.bounces - 1, 0.0};
+        return gather(some_bounces(direct, transfer_.bounces));
+    }
+    return gather(all_bounces(direct, 2e-3, statistics));
 }
 
 } // namespace afterglow

@@ -12,6 +12,8 @@
 
 namespace afterglow {
 
+inline constexpr int most_bounces = 1000; // that may be asked for by number
+
 /// All that a transfer file holds: the basis and the one-bounce operator over it. Senders are the
 /// points of the first `sender_levels` levels, receivers are all.
 struct TransferOperator {
@@ -20,6 +22,7 @@ struct TransferOperator {
     PushOperator push;
     std::vector<float> area; // that a sender speaks for [world^2], see PullOperator
     Links links;
+    int bounces = 0; // of indirect light, 0: all of them
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
     int display_level() const { return points.levels() - 1; }
@@ -57,10 +60,14 @@ public:
     Radiosity all_bounces(const Radiosity& direct, double tolerance = 2e-3,
                           NeumannStatistics* statistics = nullptr) const;
 
+    /// The first `count` terms of that sum, one product each but the first.
+    Radiosity some_bounces(const Radiosity& direct, int count) const;
+
     /// T e pushed to every receiver: indirect vector irradiance at all points.
     VectorIrradiance gather(const Radiosity& radiosity) const;
 
-    /// Indirect vector irradiance at all points under a light, all bounces.
+    /// Indirect vector irradiance at all points under a light, after as many bounces as the operator
+    /// says.
     VectorIrradiance indirect(const Surface& surface, const Spotlight& light,
                               NeumannStatistics* statistics = nullptr) const;
 

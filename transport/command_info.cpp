@@ -1,0 +1,100 @@
+#include "transport/command_info.h"
+
+#include "transport/transfer_file.h"
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+
+namespace afterglow {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct InfoCommand {
+    std::string file;
+    bool json = false;
+};
+
+std::uint64_t links_of_level(const TransferOperator& transfer, int level) {
+    const auto& begin = transfer.links.begin;
+    return begin[transfer.points.end(level)] - begin[transfer.points.begin(level)];
+}
+
+Json info_json(const TransferFile& file) {
+    const TransferOperator& transfer = file.transfer;
+    Json levels = Json::array(), bytes = Json::object();
+    for (int l = 0; l < transfer.points.levels(); ++l)
+        levels.push_back({{"functions", transfer.points.end(l) - transfer.points.begin(l)},
+                          {"spacing", transfer.points.spacing[static_cast<std::size_t>(l)]},
+                          {"sender", l < transfer.sender_levels},
+                          {"links", links_of_level(transfer, l)}});
+    for (const auto& [name, count] : file.tensor_bytes)
+        bytes[name] = count;
+    return {{"version", file.provenance.version},
+            {"scene", file.provenance.scene},
+            {"scene_hash", file.provenance.scene_hash},
+            {"seed", file.provenance.seed},
+            {"receivers", transfer.points.size()},
+            {"senders", transfer.senders()},
+            {"bounces", transfer.bounces},
+            {"links", transfer.links.entries()},
+            {"levels", levels},
+            {"bytes", bytes},
+            {"options", Json::parse(file.provenance.options)},
+            {"statistics", Json::parse(file.provenance.statistics)}};
+}
+
+/// Bytes of all tensors whose names start with `prefix`.
+std::uint64_t bytes_of(const TransferFile& file, const std::string& prefix) {
+    std::uint64_t sum = 0;
+    for (const auto& [name, count] : file.tensor_bytes)
+        if (name.starts_with(prefix)) sum += count;
+    return sum;
+}
+
+void print_text(const TransferFile& file) {
+    const TransferOperator& transfer = file.transfer;
+    const TransferProvenance& provenance = file.provenance;
+    std::printf("scene       %s\n", provenance.scene.c_str());
+    std::printf("hash        %s\n", provenance.scene_hash.c_str());
+    std::printf("written by  afterglow %s\n", provenance.version.c_str());
+    std::printf("options     %s\n", provenance.options.c_str());
+    std::printf("receivers   %u on %d levels\n", transfer.points.size(), transfer.points.levels());
+    std::printf("senders     %u on %d levels\n", transfer.senders(), transfer.sender_levels);
+    const auto megabytes = [&](const char* prefix) {
+        return static_cast<double>(bytes_of(file, prefix)) * 1e-6;
+    };
+    std::printf("megabytes   %.2f: links %.2f, push %.2f, points %.2f\n", megabytes(""),
+                megabytes("links."), megabytes("push."), megabytes("points."));
+    std::printf("level  functions    spacing       links  links a function\n");
+    for (int l = 0; l < transfer.points.levels(); ++l) {
+        const std::uint32_t functions = transfer.points.end(l) - transfer.points.begin(l);
+        const std::uint64_t links = links_of_level(transfer, l);
+        std::printf("%5d  %9u  %9.4g  %10llu  %16.1f\n", l, functions,
+                    static_cast<double>(transfer.points.spacing[static_cast<std::size_t>(l)]),
+                    static_cast<unsigned long long>(links),
+                    static_cast<double>(links) / std::max(1u, functions));
+    }
+}
+
+} // namespace
+
+void add_info_command(CLI::App& app) {
+    CLI::App* sub = app.add_subcommand("info", "What a transfer file holds");
+    const auto command = std::make_shared<InfoCommand>();
+    sub->add_option("file", command->file, "Transfer file")->required();
+    sub->add_flag("--json", command->json, "One JSON object instead of text");
+    sub->callback([command] {
+        const TransferFile file = load_transfer(command->file);
+        if (command->json)
+            std::printf("%s\n", info_json(file).dump().c_str());
+        else
+            print_text(file);
+    });
+}
+
+} // namespace afterglow

@@ -1,0 +1,226 @@
+#include "transport/command_precompute.h"
+
+#include "core/error.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "transport/cli_options.h"
+#include "transport/precompute.h"
+#include "transport/provenance.h"
+#include "transport/target_error.h"
+#include "transport/transfer_file.h"
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+namespace afterglow {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+struct PrecomputeCommand {
+    std::string scene, output, report, operator_name = "neumann";
+    double target_error = 0.1, epsilon = 0.0, coarse_radius = 0.0;
+    int bounces = 0;
+    PrecomputeOptions options;
+    RunOptions run;
+};
+
+/// Wall-clock time of what happens around precompute().
+struct OuterSeconds {
+    double load = 0.0, tree = 0.0, write = 0.0, total = 0.0;
+};
+
+/// The seconds since `start`, which moves on to now.
+double lap(Clock::time_point& start) {
+    const Clock::time_point before = std::exchange(start, Clock::now());
+    return std::chrono::duration<double>(start - before).count();
+}
+
+Json vector_json(const Vec3& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+Json options_json(const PrecomputeCommand& command) {
+    const PrecomputeOptions& options = command.options;
+    Json json = {{"operator", command.operator_name},
+                 {"threshold", std::stod(number_text(options.links.threshold))},
+                 {"coarse_radius", command.coarse_radius},
+                 {"receiver_levels", options.receiver_levels},
+                 {"sender_levels", options.sender_levels},
+                 {"rays", options.links.rays},
+                 {"bounces", command.bounces},
+                 {"seed", options.seed}};
+    if (options.viewpoint) json["viewpoint"] = vector_json(*options.viewpoint);
+    return json;
+}
+
+/// Counts and measures of length: nothing that differs from run to run.
+Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& report) {
+    Json viewpoints = Json::array(), levels = Json::array();
+    for (const Vec3& viewpoint : report.viewpoints)
+        viewpoints.push_back(vector_json(viewpoint));
+    for (int l = 0; l < transfer.points.levels(); ++l) {
+        const LevelStatistics& level = report.hierarchy.level[static_cast<std::size_t>(l)];
+        levels.push_back({{"functions", level.points},
+                          {"candidates", level.candidates_tried},
+                          {"largest_gap", level.largest_gap},
+                          {"links", report.links.links[static_cast<std::size_t>(l)]}});
+    }
+    return {{"viewpoints", viewpoints},
+            {"mean_ray_length", report.mean_ray_length},
+            {"levels", levels},
+            {"senders", transfer.senders()},
+            {"links", transfer.links.entries()},
+            {"links_before", report.links.links_before},
+            {"rays_of_points", report.points_rays},
+            {"rays_of_links", report.links.rays},
+            {"patch_rows", report.links.patches},
+            {"uncovered_patch_rows", report.links.uncovered_patches}};
+}
+
+Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
+    return {{"load", outer.load},
+            {"tree", outer.tree},
+            {"points", report.points_seconds},
+            {"push", report.push_seconds},
+            {"gather", report.links.trace_seconds},
+            {"rows", report.links.rows_seconds},
+            {"links", report.links.links_seconds},
+            {"precompute", report.total_seconds},
+            {"write", outer.write},
+            {"total", outer.total}};
+}
+
+void print_results(const PrecomputeCommand& command, const TransferOperator& transfer,
+                   const PrecomputeReport& report, const OuterSeconds& outer) {
+    const auto say = [](const char* format, auto... values) {
+        std::fprintf(stderr, format, values...);
+    };
+    for (int l = 0; l < transfer.points.levels(); ++l) {
+        const auto functions = transfer.points.end(l) - transfer.points.begin(l);
+        const std::uint64_t links = report.links.links[static_cast<std::size_t>(l)];
+        say("level %d: %u functions, spacing %.4g, %.1f links a function%s\n", l, functions,
+            static_cast<double>(transfer.points.spacing[static_cast<std::size_t>(l)]),
+            static_cast<double>(links) / std::max(1u, functions),
+            l < transfer.sender_levels ? ", senders too" : "");
+    }
+    say("%s: %.1f MB, %.3g links of %.3g, %.3g rays, %s\n", command.output.c_str(),
+        static_cast<double>(std::filesystem::file_size(command.output)) * 1e-6,
+        static_cast<double>(transfer.links.entries()),
+        static_cast<double>(report.links.links_before),
+        static_cast<double>(report.links.rays + report.points_rays),
+        duration_text(outer.total).c_str());
+}
+
+void run(PrecomputeCommand& command) {
+    check_output(command.output);
+    if (!command.report.empty()) check_output(command.report);
+    const ThreadLimit limit(command.run.threads);
+    OuterSeconds outer;
+    const auto start = Clock::now();
+    auto time = start;
+    const Scene scene = load_scene(command.scene);
+    outer.load = lap(time);
+    if (const std::string line = scene.summary.line(); !line.empty() && !command.run.quiet)
+        std::fprintf(stderr, "%s: %s\n", command.scene.c_str(), line.c_str());
+    const Surface surface(scene);
+    outer.tree = lap(time);
+
+    PrecomputeReport report;
+    TransferOperator transfer = precompute(surface, command.options, &report);
+    transfer.bounces = command.bounces;
+    lap(time);
+    const Json options = options_json(command), statistics = statistics_json(transfer, report);
+    const std::string hash = scene.content_hash();
+    save_transfer(command.output, transfer,
+                  {AFTERGLOW_VERSION, command.scene, hash, command.options.seed, options.dump(),
+                   statistics.dump()});
+    outer.write = lap(time);
+    outer.total = std::chrono::duration<double>(time - start).count();
+
+    if (!command.report.empty()) {
+        const Json json = {{"version", AFTERGLOW_VERSION},
+                           {"scene", command.scene},
+                           {"scene_hash", hash},
+                           {"triangles", scene.triangles.size()},
+                           {"threads", thread_count()},
+                           {"options", options},
+                           {"statistics", statistics},
+                           {"bytes", std::filesystem::file_size(command.output)},
+                           {"seconds", seconds_json(report, outer)}};
+        write_text(command.report, json.dump(1) + "\n");
+    }
+    if (!command.run.quiet) print_results(command, transfer, report, outer);
+}
+
+/// Turns what was typed into PrecomputeOptions; throws UsageError for what cannot be.
+void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
+    const auto given = [&](const char* option) { return sub.count(option) > 0; };
+    if (command.operator_name != "neumann")
+        throw UsageError("unknown operator '" + command.operator_name + "'; there is neumann");
+    if (given("--target-error") && !(command.target_error > 0.0))
+        throw UsageError("--target-error must be positive");
+    if (given("--epsilon") && !(command.epsilon >= 0.0))
+        throw UsageError("--epsilon must not be negative");
+    if (given("--coarse-radius") && !(command.coarse_radius > 0.0))
+        throw UsageError("--coarse-radius must be positive");
+    PrecomputeOptions& options = command.options;
+    options.seed = command.run.seed;
+    options.coarse_radius = static_cast<float>(command.coarse_radius);
+    options.links.threshold = given("--epsilon") ? static_cast<float>(command.epsilon)
+                                                 : threshold_for_error(command.target_error);
+    if (!given("--sender-levels"))
+        options.sender_levels = std::min(options.sender_levels, options.receiver_levels);
+}
+
+} // namespace
+
+void add_precompute_command(CLI::App& app) {
+    CLI::App* sub =
+        app.add_subcommand("precompute", "Computes the transfer file of a scene: the slow step");
+    const auto command = std::make_shared<PrecomputeCommand>();
+    sub->add_option("scene", command->scene, "Wavefront OBJ file or builtin:NAME")->required();
+    sub->add_option("-o,--output", command->output, "Transfer file")->required();
+    CLI::Option* target_error =
+        add_number(*sub, "--target-error", command->target_error,
+                   "Relative error of the indirect irradiance that dropped links may make "
+                   "(default 0.1)");
+    add_number(*sub, "--epsilon", command->epsilon, "Instead: links below this size are dropped")
+        ->excludes(target_error);
+    sub->add_option("--operator", command->operator_name,
+                    "neumann: one bounce, repeated at run time (default)");
+    sub->add_option_function<std::string>(
+           "--viewpoint",
+           [command](const std::string& text) {
+               command->options.viewpoint = parse_numbers("--viewpoint", text, 3);
+           },
+           "Where the scene is looked at from (default: found by itself)")
+        ->type_name("x,y,z");
+    add_number(*sub, "--coarse-radius", command->coarse_radius,
+               "Distance between the coarsest points (default: a third of the typical distance "
+               "between surfaces); halves from level to level");
+    sub->add_option("--receiver-levels", command->options.receiver_levels,
+                    "Levels of points (default 5)");
+    sub->add_option("--sender-levels", command->options.sender_levels,
+                    "How many of them, from the coarsest on, also send light (default 4)");
+    sub->add_option("--rays", command->options.links.rays,
+                    "Gather rays of each finest point, a power of two (default 512); twice as many "
+                    "a level up");
+    sub->add_option("--bounces", command->bounces, "Bounces of indirect light (default 0: all)")
+        ->check(CLI::Range(0, most_bounces));
+    sub->add_option("--report", command->report, "JSON file for counts and times");
+    add_run_options(*sub, command->run);
+    sub->callback([sub, command] {
+        fill_options(*command, *sub);
+        run(*command);
+    });
+}
+
+} // namespace afterglow

@@ -1,0 +1,66 @@
+#include "transport/command_query.h"
+
+#include "core/parallel.h"
+#include "transport/cli_options.h"
+#include "transport/csv_points.h"
+#include "transport/provenance.h"
+#include "transport/transfer_scene.h"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <memory>
+
+namespace afterglow {
+namespace {
+
+struct QueryCommand {
+    std::string file, scene, points, output;
+    Spotlight light;
+    int threads = 0;
+    bool quiet = false;
+};
+
+void run(QueryCommand& command) {
+    command.light.check();
+    check_output(command.output);
+    const ThreadLimit limit(command.threads);
+    const std::vector<SurfacePoint> points = read_points_csv(command.points);
+    const TransferScene opened(command.file, command.scene);
+    const VectorIrradiance field = opened.transport.indirect(opened.surface, command.light);
+
+    const auto count = static_cast<Index>(points.size());
+    Eigen::Array3Xf irradiance(3, count);
+    std::vector<std::uint8_t> is_uncovered(points.size(), 0);
+    parallel_for(count, [&](Index k) {
+        const auto i = static_cast<std::size_t>(k);
+        bool covered = false;
+        irradiance.col(k) = opened.display.irradiance(points[i], field, covered);
+        is_uncovered[i] = !covered;
+    });
+    write_irradiance_csv(command.output, irradiance);
+
+    const auto uncovered = std::count(is_uncovered.begin(), is_uncovered.end(), 1);
+    if (uncovered > 0 && !command.quiet)
+        std::fprintf(stderr, "afterglow: warning: no function covers %lld of %lld points\n",
+                     static_cast<long long>(uncovered), static_cast<long long>(count));
+}
+
+} // namespace
+
+void add_query_command(CLI::App& app) {
+    CLI::App* sub =
+        app.add_subcommand("query", "Indirect irradiance at points, from a transfer file");
+    const auto command = std::make_shared<QueryCommand>();
+    sub->add_option("file", command->file, "Transfer file")->required();
+    sub->add_option("--points", command->points, "CSV file of x,y,z,nx,ny,nz")->required();
+    sub->add_option("-o,--output", command->output, "CSV file of E_r,E_g,E_b")->required();
+    sub->add_option("--scene", command->scene, "Where the scene is now");
+    add_light_options(*sub, command->light);
+    sub->add_option("--threads", command->threads, "Threads to use (default 0: all processors)")
+        ->check(CLI::Range(0, 4096));
+    sub->add_flag("--quiet", command->quiet, "Nothing on stderr but errors");
+    sub->callback([command] { run(*command); });
+}
+
+} // namespace afterglow

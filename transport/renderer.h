@@ -1,0 +1,32 @@
+#pragma once
+
+#include "core/camera.h"
+#include "core/image.h"
+#include "core/surface.h"
+#include "transport/display.h"
+#include "transport/path_tracer.h"
+#include "transport/spotlight.h"
+
+#include <cstdint>
+
+namespace afterglow {
+
+struct RenderOptions {
+    int samples = 4; // of a pixel, stratified over its area (box filter)
+    std::uint64_t seed = 1;
+};
+
+struct RenderedPicture {
+    Image image; // no attributes; black where the camera sees nothing
+    /// Pixels with a sample on a surface that no function covers: there is no indirect light there.
+    std::uint64_t uncovered_pixels = 0;
+};
+
+/// The picture of render_reference() by precomputed transport. `field`, as from
+/// LightTransport::indirect() under the same light, is not looked at for Layer::direct, and may be
+/// empty then. Deterministic on any number of threads.
+RenderedPicture render_picture(const Surface& surface, const Display& display,
+                               const VectorIrradiance& field, const Spotlight& light,
+                               const Camera& camera, Layer layer, const RenderOptions& options);
+
+} // namespace afterglow

@@ -1,0 +1,392 @@
+#include "transport/transfer_file.h"
+
+#include "core/builtin_scenes.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "transport/safetensors.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <system_error>
+
+namespace afterglow {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr const char* format_name = "afterglow transfer";
+constexpr const char* format_version = "1";
+constexpr const char* operator_name = "neumann";
+
+static_assert(sizeof(LinkValue) == 3 * sizeof(Eigen::half), "links are mapped as rows of 3 halves");
+
+/// Sender indices are stored in 16 bits where all of them fit.
+bool has_short_indices(std::uint32_t senders) {
+    return senders <= 1u << 16;
+}
+
+// The scene's path
+
+/// Absolute and without symbolic links, as far as the file system tells.
+std::filesystem::path resolved(const std::filesystem::path& path) {
+    std::error_code ignored;
+    const auto absolute = std::filesystem::absolute(path, ignored);
+    const auto canonical = std::filesystem::weakly_canonical(absolute, ignored);
+    return ignored ? absolute.lexically_normal() : canonical;
+}
+
+/// The folder that a transfer file really lies in: where its relative paths start.
+std::filesystem::path folder_of(const std::string& path) {
+    return resolved(path).parent_path();
+}
+
+/// A scene's path relative to the folder of `file`. Only its folder is resolved, as the files that
+/// an OBJ file names are sought beside it, not beside what it may be a link to.
+std::string stored_scene_path(const std::string& file, const std::string& scene) {
+    if (is_builtin_scene(scene)) return scene;
+    const std::filesystem::path name(scene);
+    const auto folder = resolved(name.has_parent_path() ? name.parent_path() : ".");
+    const auto relative = folder.lexically_relative(folder_of(file));
+    return ((relative.empty() ? folder : relative) / name.filename()).lexically_normal().string();
+}
+
+std::string opened_scene_path(const std::string& file, const std::string& stored) {
+    if (is_builtin_scene(stored) || std::filesystem::path(stored).is_absolute()) return stored;
+    return (folder_of(file) / stored).lexically_normal().string();
+}
+
+// What the computation needs to know beside the arrays
+
+/// A float as the number that its shortest decimal form names: 0.1, not 0.10000000149011612. Gives
+/// the same float back.
+double decimal(float value) {
+    char text[32];
+    const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+    double number = 0.0;
+    std::from_chars(text, end, number);
+    return number;
+}
+
+std::string model_text(const TransferOperator& transfer) {
+    const BasisShape& shape = transfer.points.shape;
+    return Json{{"operator", operator_name},
+                {"sender_levels", transfer.sender_levels},
+                {"bounces", transfer.bounces},
+                {"weight_power", shape.weight_power},
+                {"placement_power", shape.placement_power},
+                {"reach_coarsest", decimal(shape.reach_coarsest)},
+                {"reach_finest", decimal(shape.reach_finest)}}
+        .dump();
+}
+
+// Checking
+
+/// Takes a file's tensors and metadata into a TransferOperator, trusting nothing.
+class Reader {
+public:
+    explicit Reader(const SafetensorsFile& file) : file_(file) {}
+
+    void read(TransferFile& result) {
+        check_format();
+        read_points(result.transfer.points);
+        read_model(result.transfer);
+        read_push(result.transfer);
+        read_area(result.transfer);
+        read_links(result.transfer);
+        read_provenance(result.provenance);
+        for (const Tensor& tensor : file_.tensors())
+            result.tensor_bytes.emplace_back(tensor.name, tensor.bytes.size());
+    }
+
+private:
+    [[noreturn]] void fail(const std::string& what) const {
+        throw FileError(file_.path(), what + "; run precompute again");
+    }
+
+    void check_format() const {
+        if (file_.metadata("format") != format_name) fail("is not a transfer file of afterglow");
+        const std::string& version = file_.metadata("format_version");
+        if (version != format_version)
+            fail("has another format version than " + std::string(format_version)
+                 + ", which this program reads");
+    }
+
+    template <class T>
+    std::span<const T> tensor(const std::string& name, const TensorShape& shape) const {
+        return file_.tensor<T>(name, shape);
+    }
+    template <class T>
+    SharedArray<T> shared(std::span<const T> values) const {
+        return {values, file_.map()};
+    }
+
+    void read_points(PointHierarchy& points) const {
+        const auto level_begin = tensor<std::uint32_t>("level_begin", {any_extent});
+        const auto spacing = tensor<float>("spacing", {any_extent});
+        if (spacing.empty() || spacing.size() > 32 || level_begin.size() != spacing.size() + 1
+            || level_begin[0] != 0 || !std::is_sorted(level_begin.begin(), level_begin.end())
+            || level_begin.back() == 0 || level_begin.back() == no_index)
+            fail("has levels that are not consecutive ranges of points");
+        const std::uint64_t count = level_begin.back();
+        const auto position = tensor<float>("points.position", {count, 3});
+        const auto normal = tensor<float>("points.normal", {count, 3});
+        const auto support = tensor<float>("points.support", {count});
+        const auto reflectance = tensor<float>("points.reflectance", {count, 3});
+        const auto all = [](std::span<const float> values, const auto& good) {
+            return std::all_of(values.begin(), values.end(), good);
+        };
+        const auto finite = [](float x) { return std::isfinite(x); };
+        const auto positive = [](float x) { return x > 0.0f && std::isfinite(x); };
+        if (!all(spacing, positive)) fail("has a spacing that is not positive");
+        if (!all(position, finite)) fail("has a point at no finite position");
+        if (!all(support, positive)) fail("has a support that is not positive");
+        if (!all(reflectance, [](float x) { return x >= 0.0f && x < 1.0f; }))
+            fail("has a reflectance outside [0, 1)");
+        const auto n = static_cast<Index>(count);
+        points.level_begin.assign(level_begin.begin(), level_begin.end());
+        points.spacing.assign(spacing.begin(), spacing.end());
+        points.position = Eigen::Matrix3Xf::Map(position.data(), 3, n);
+        points.normal = Eigen::Matrix3Xf::Map(normal.data(), 3, n);
+        points.support = Eigen::VectorXf::Map(support.data(), n);
+        points.reflectance = Eigen::Matrix3Xf::Map(reflectance.data(), 3, n);
+        // Negated, so that a NaN fails.
+        const auto length_error = (points.normal.colwise().squaredNorm().array() - 1.0f).abs();
+        if (!(length_error < 1e-3f).all()) fail("has a normal that is not of unit length");
+    }
+
+    void read_model(TransferOperator& transfer) const {
+        const Json model = parse("model");
+        if (model.value("operator", Json()) != operator_name)
+            fail("holds an operator that this program does not know");
+        BasisShape& shape = transfer.points.shape;
+        transfer.sender_levels = integer(model, "sender_levels", 1, transfer.points.levels());
+        transfer.bounces = integer(model, "bounces", 0, most_bounces);
+        shape.weight_power = integer(model, "weight_power", 1, 1000);
+        shape.placement_power = integer(model, "placement_power", 1, 1000);
+        shape.reach_coarsest = reach(model, "reach_coarsest");
+        shape.reach_finest = reach(model, "reach_finest");
+        if (transfer.senders() == 0) fail("has no senders");
+    }
+
+    Json parse(const std::string& key) const {
+        Json json = Json::parse(file_.metadata(key), nullptr, false);
+        if (!json.is_object()) fail("has metadata '" + key + "' that is no JSON object");
+        return json;
+    }
+
+    int integer(const Json& model, const char* key, int least, int most) const {
+        const auto value = model.find(key);
+        if (value == model.end() || !value->is_number_integer() || *value < least || *value > most)
+            fail(std::string("needs ") + key + " between " + std::to_string(least) + " and "
+                 + std::to_string(most));
+        return value->get<int>();
+    }
+
+    float reach(const Json& model, const char* key) const {
+        const auto value = model.find(key);
+        if (value == model.end() || !value->is_number() || !(*value > 0.0) || !(*value < 1000.0))
+            fail(std::string("needs a positive ") + key);
+        return value->get<float>();
+    }
+
+    /// Offsets of `rows` rows over `entries` entries: from 0, never falling.
+    SharedArray<std::uint64_t> read_begin(const std::string& name, std::uint64_t rows,
+                                          std::uint64_t entries) const {
+        const auto begin = tensor<std::uint64_t>(name, {rows + 1});
+        if (begin.front() != 0 || begin.back() != entries
+            || !std::is_sorted(begin.begin(), begin.end()))
+            fail("has row offsets '" + name + "' that do not rise from 0 to the last entry");
+        return shared(begin);
+    }
+
+    /// Fails unless the indices of every row in [first, last) rise strictly within [low, high).
+    template <class T>
+    void check_rows(const std::string& name, const SharedArray<std::uint64_t>& begin,
+                    std::span<const T> index, std::uint32_t first, std::uint32_t last,
+                    std::uint64_t low, std::uint64_t high) const {
+        parallel_ranges(last - first, 1024, [&](Index from, Index to) {
+            for (Index row = first + from; row < first + to; ++row) {
+                std::int64_t before = static_cast<std::int64_t>(low) - 1;
+                bool good = true;
+                for (std::uint64_t k = begin[row]; k < begin[row + 1]; ++k) {
+                    good &= before < index[k];
+                    before = index[k];
+                }
+                if (!good || before >= static_cast<std::int64_t>(high))
+                    fail("has indices '" + name + "' of which a row is unsorted or out of range");
+            }
+        });
+    }
+
+    void read_push(TransferOperator& transfer) const {
+        const PointHierarchy& points = transfer.points;
+        SparseRows<float>& rows = transfer.push.parents;
+        const auto index = tensor<std::uint32_t>("push.index", {any_extent});
+        const auto value = tensor<float>("push.value", {index.size()});
+        rows.begin = read_begin("push.begin", points.size(), index.size());
+        check_rows("push.index", rows.begin, index, 0, points.end(0), 0, 0);
+        for (int l = 1; l < points.levels(); ++l)
+            check_rows("push.index", rows.begin, index, points.begin(l), points.end(l),
+                       points.begin(l - 1), points.end(l - 1));
+        if (!std::all_of(value.begin(), value.end(), [](float x) { return x >= 0.0f && x < 2.0f; }))
+            fail("has a push weight that is no share");
+        rows.index = shared(index);
+        rows.value = shared(value);
+    }
+
+    void read_area(TransferOperator& transfer) const {
+        const auto area = tensor<float>("senders.area", {transfer.senders()});
+        if (!std::all_of(area.begin(), area.end(),
+                         [](float x) { return x > 0.0f && std::isfinite(x); }))
+            fail("has a sender whose area is not positive");
+        transfer.area.assign(area.begin(), area.end());
+    }
+
+    void read_links(TransferOperator& transfer) const {
+        const auto half = tensor<Eigen::half>("links.value", {any_extent, 3});
+        const std::uint64_t entries = half.size() / 3;
+        transfer.links.begin = read_begin("links.begin", transfer.points.size(), entries);
+        if (has_short_indices(transfer.senders())) {
+            const auto index = tensor<std::uint16_t>("links.sender", {entries});
+            check_links(transfer, index);
+            std::vector<std::uint32_t> wide(entries);
+            parallel_ranges(static_cast<Index>(entries), 1 << 16, [&](Index from, Index to) {
+                std::copy(index.begin() + from, index.begin() + to, wide.begin() + from);
+            });
+            transfer.links.index = SharedArray(std::move(wide));
+        } else {
+            const auto index = tensor<std::uint32_t>("links.sender", {entries});
+            check_links(transfer, index);
+            transfer.links.index = shared(index);
+        }
+        parallel_ranges(static_cast<Index>(half.size()), 1 << 16, [&](Index from, Index to) {
+            bool finite = true;
+            for (Index k = from; k < to; ++k)
+                finite &= (half[k].x & 0x7c00) != 0x7c00; // all ones: infinite or NaN
+            if (!finite) fail("has a link that is not finite");
+        });
+        transfer.links.value = {{reinterpret_cast<const LinkValue*>(half.data()), entries},
+                                file_.map()};
+    }
+
+    template <class T>
+    void check_links(const TransferOperator& transfer, std::span<const T> index) const {
+        check_rows("links.sender", transfer.links.begin, index, 0, transfer.points.size(), 0,
+                   transfer.senders());
+    }
+
+    void read_provenance(TransferProvenance& provenance) const {
+        const std::string& seed = file_.metadata("seed");
+        const auto [end, error] =
+            std::from_chars(seed.data(), seed.data() + seed.size(), provenance.seed);
+        if (error != std::errc{} || end != seed.data() + seed.size())
+            fail("has a seed that is no number");
+        provenance.version = line("version");
+        provenance.scene = opened_scene_path(file_.path(), line("scene"));
+        provenance.scene_hash = line("scene_hash");
+        provenance.options = file_.metadata("options");
+        provenance.statistics = file_.metadata("statistics");
+        parse("options");
+        parse("statistics");
+    }
+
+    /// Metadata that messages repeat: one short line.
+    const std::string& line(const std::string& key) const {
+        const std::string& text = file_.metadata(key);
+        const auto control = [](unsigned char c) { return c < 32 || c == 127; };
+        if (text.empty() || text.size() > 4096 || std::any_of(text.begin(), text.end(), control))
+            fail("has metadata '" + key + "' that is no line of text");
+        return text;
+    }
+
+    const SafetensorsFile& file_;
+};
+
+template <class Scalar, int Rows, int Columns>
+std::span<const Scalar> values_of(const Eigen::Matrix<Scalar, Rows, Columns>& matrix) {
+    return {matrix.data(), static_cast<std::size_t>(matrix.size())};
+}
+
+} // namespace
+
+void save_transfer(const std::string& path, const TransferOperator& transfer,
+                   const TransferProvenance& provenance) {
+    const PointHierarchy& points = transfer.points;
+    const SparseRows<float>& push = transfer.push.parents;
+    const Links& links = transfer.links;
+    const std::uint64_t count = points.size(), levels = points.spacing.size();
+    const auto floats = [](std::string name, TensorShape shape, std::span<const float> values) {
+        return make_tensor(std::move(name), std::move(shape), values);
+    };
+
+    std::vector<std::uint16_t> short_sender;
+    Tensor sender = make_tensor("links.sender", {links.entries()}, links.index.span());
+    if (has_short_indices(transfer.senders())) {
+        short_sender.assign(links.index.span().begin(), links.index.span().end());
+        sender = make_tensor<std::uint16_t>("links.sender", {links.entries()}, short_sender);
+    }
+    const std::span<const Eigen::half> halves{
+        reinterpret_cast<const Eigen::half*>(links.value.data()), 3 * links.entries()};
+
+    const std::vector<Tensor> tensors = {
+        floats("points.position", {count, 3}, values_of(points.position)),
+        floats("points.normal", {count, 3}, values_of(points.normal)),
+        floats("points.support", {count}, values_of(points.support)),
+        floats("points.reflectance", {count, 3}, values_of(points.reflectance)),
+        make_tensor<std::uint32_t>("level_begin", {levels + 1}, points.level_begin),
+        floats("spacing", {levels}, points.spacing),
+        make_tensor("push.begin", {count + 1}, push.begin.span()),
+        make_tensor("push.index", {push.entries()}, push.index.span()),
+        make_tensor("push.value", {push.entries()}, push.value.span()),
+        floats("senders.area", {transfer.senders()}, transfer.area),
+        make_tensor("links.begin", {count + 1}, links.begin.span()),
+        sender,
+        make_tensor("links.value", {links.entries(), 3}, halves)};
+
+    write_safetensors(path, tensors,
+                      {{"format", format_name},
+                       {"format_version", format_version},
+                       {"version", provenance.version},
+                       {"scene", stored_scene_path(path, provenance.scene)},
+                       {"scene_hash", provenance.scene_hash},
+                       {"seed", std::to_string(provenance.seed)},
+                       {"model", model_text(transfer)},
+                       {"options", provenance.options},
+                       {"statistics", provenance.statistics}});
+}
+
+TransferFile load_transfer(const std::string& path) {
+    const SafetensorsFile file(path);
+    TransferFile result;
+    Reader(file).read(result);
+    return result;
+}
+
+Scene load_transfer_scene(const std::string& path, const TransferProvenance& provenance,
+                          const std::string& override_path) {
+    const std::string& wanted = override_path.empty() ? provenance.scene : override_path;
+    std::error_code ignored;
+    if (override_path.empty() && !is_builtin_scene(wanted)
+        && !std::filesystem::exists(wanted, ignored))
+        throw FileError(path, "was made from the scene " + wanted
+                                  + ", which is not there; name it with --scene");
+    Scene scene;
+    try {
+        scene = load_scene(wanted);
+    } catch (const UsageError& error) {
+        // The name of a built-in scene out of a file is no fault of the command line.
+        if (!override_path.empty()) throw;
+        throw FileError(path, error.what());
+    }
+    if (const std::string hash = scene.content_hash(); hash != provenance.scene_hash)
+        throw FileError(path, "was made from a scene with content hash " + provenance.scene_hash
+                                  + ", but " + wanted + " has " + hash
+                                  + "; run precompute again, or name the right one with --scene");
+    return scene;
+}
+
+} // namespace afterglow
