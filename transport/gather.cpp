@@ -46,7 +46,7 @@ void GatherDirections::deal(Index receiver, Eigen::Matrix3Xf& directions) const 
     }
 }
 
-void trace_gather(const Surface& surface, const PatchGrid& grid, const PointHierarchy& points,
+void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
                   const Footprint& footprint, std::vector<GatherSample>& samples) {
     const int rays = directions.rays();
@@ -66,8 +66,15 @@ void trace_gather(const Surface& surface, const PatchGrid& grid, const PointHier
             for (int k = 0; k < rays; ++k) {
                 const float pdf = vector_irradiance_pdf(local(2, k));
                 sample[k].weight = ray[k].direction / (static_cast<float>(EIGEN_PI) * pdf * rays);
-                sample[k].patch = hit[k] ? grid.patch_of(hit[k]) : no_index;
-                sample[k].level = hit[k] ? footprint.level(hit[k]) : 0.0f;
+                sample[k].finer_share = 0.0f;
+                sample[k].row = sample[k].finer_row = no_index;
+                if (!hit[k]) continue;
+                const float at = footprint.level(hit[k]);
+                const int level = static_cast<int>(at);
+                sample[k].row = rows.number(hit[k], level);
+                if (at == static_cast<float>(level)) continue;
+                sample[k].finer_share = at - static_cast<float>(level);
+                sample[k].finer_row = rows.number(hit[k], level + 1);
             }
         }
     });

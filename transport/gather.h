@@ -15,13 +15,12 @@
 
 namespace afterglow {
 
-/// One ray of a hemispherical gather and what it adds.
+/// One ray of a hemispherical gather and what it adds: `weight` times the field of the senders where
+/// it ends, read between two levels.
 struct GatherSample {
-    Vec3 weight;         // omega / (pi pdf N): direction, no cosine
-    std::uint32_t patch; // what the ray meets; no_index where it leaves the scene
-    /// The sender level to look at, with a fraction: 0 the coarsest. Distant surfaces are seen
-    /// through coarse functions, see Footprint.
-    float level;
+    Vec3 weight;       // omega / (pi pdf N): direction, no cosine
+    float finer_share; // of the finer row, in [0, 1]
+    std::uint32_t row, finer_row; // numbers of SenderRows; both no_index where the ray leaves the scene
 };
 
 /// Which sender level a ray looks at: the finest whose spacing R_l is at least
@@ -57,47 +56,8 @@ private:
 };
 
 /// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k].
-void trace_gather(const Surface& surface, const PatchGrid& grid, const PointHierarchy& points,
+void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
                   const Footprint& footprint, std::vector<GatherSample>& samples);
-
-/// A dense vector over the senders that knows which places are in use, in order.
-template <class Value>
-class Accumulator {
-public:
-    explicit Accumulator(std::size_t size, const Value& zero)
-        : zero_(zero), value_(size, zero), used_((size + 63) / 64, 0) {}
-    Value& at(std::uint32_t i) {
-        used_[i >> 6] |= std::uint64_t{1} << (i & 63);
-        return value_[i];
-    }
-    const Value& operator[](std::uint32_t i) const { return value_[i]; }
-    /// Calls visit(i, value) for the used places in [begin, end), increasing; visit may use others
-    /// outside that range.
-    template <class Visit>
-    void for_each(std::uint32_t begin, std::uint32_t end, const Visit& visit) {
-        for (std::uint32_t word = begin >> 6; word << 6 < end; ++word) {
-            std::uint64_t bits = used_[word];
-            if (word << 6 < begin) bits &= ~std::uint64_t{0} << (begin & 63);
-            for (; bits != 0; bits &= bits - 1) {
-                const std::uint32_t i = (word << 6) + static_cast<std::uint32_t>(std::countr_zero(bits));
-                if (i >= end) return;
-                visit(i, value_[i]);
-            }
-        }
-    }
-    void clear() {
-        for (std::size_t word = 0; word < used_.size(); ++word) {
-            for (std::uint64_t bits = used_[word]; bits != 0; bits &= bits - 1)
-                value_[(word << 6) + std::countr_zero(bits)] = zero_;
-            used_[word] = 0;
-        }
-    }
-
-private:
-    Value zero_;
-    std::vector<Value> value_;
-    std::vector<std::uint64_t> used_;
-};
 
 } // namespace afterglow

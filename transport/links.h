@@ -27,7 +27,8 @@ struct LinkOptions {
     /// A link d is kept where |d| R_l / R_0 > threshold (R_l: spacing of the receiver's level). What
     /// is dropped of the coarsest senders goes onto those that stay, so that the response to uniform
     /// light stays exact.
-    float threshold = 1e-3f;
+    float threshold = 5e-3f;
+    float level_power = 1.0f;
     std::uint64_t seed = 1;
 };
 

@@ -65,8 +65,7 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     transfer.push = make_push_operator(basis);
     r.push_seconds = seconds_since(push_start);
 
-    const float patch_size = 0.5f * transfer.points.spacing[options.sender_levels - 1];
-    SenderRows rows(surface, basis, options.sender_levels, patch_size);
+    SenderRows rows(surface, basis, options.sender_levels);
     LinkOptions links = options.links;
     links.seed = options.seed;
     transfer.links = make_links(surface, transfer.points, transfer.push, rows, links, r.links);

@@ -3,24 +3,34 @@
 #include "core/error.h"
 #include "core/parallel.h"
 
+#include <algorithm>
+
 namespace afterglow {
 
-SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_size)
-    : surface_(surface), basis_(basis), levels_(levels), grid_(surface.scene(), patch_size),
-      place_(static_cast<std::size_t>(grid_.patch_count()) * levels) {}
+SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_share)
+    : surface_(surface), basis_(basis) {
+    std::uint64_t count = 0;
+    for (int l = 0; l < levels; ++l) {
+        grid_.emplace_back(surface.scene(), patch_share * basis.points().spacing[l]);
+        first_.push_back(static_cast<std::uint32_t>(count));
+        count += grid_.back().patch_count();
+    }
+    if (count >= no_index) throw Error("too many surface patches; choose a larger --coarse-radius");
+    place_.resize(count);
+}
 
-void SenderRows::require(std::span<const std::uint64_t> numbers) {
-    std::vector<std::uint64_t> missing;
-    for (const std::uint64_t number : numbers)
-        if (place_[number].count == not_made) {
+void SenderRows::require(std::span<const std::uint32_t> numbers) {
+    std::vector<std::uint32_t> missing;
+    for (const std::uint32_t number : numbers)
+        if (number != no_index && place_[number].count == not_made) {
             place_[number].count = 0; // listed once
             missing.push_back(number);
         }
     std::vector<std::vector<BasisEntry>> rows(missing.size());
     parallel_for(static_cast<Index>(missing.size()), [&](Index i) {
-        const auto patch = static_cast<std::uint32_t>(missing[i] / levels_);
-        const int level = static_cast<int>(missing[i] % levels_);
-        const SurfacePoint x = surface_.point(grid_.center(patch));
+        const int level = static_cast<int>(
+            std::upper_bound(first_.begin(), first_.end(), missing[i]) - first_.begin() - 1);
+        const SurfacePoint x = surface_.point(grid_[level].center(missing[i] - first_[level]));
         // Where the level has no function, the next coarser speaks for it.
         for (int l = level; l >= 0 && rows[i].empty(); --l) basis_.evaluate(l, x, rows[i]);
         if (rows[i].empty()) basis_.evaluate_or_nearest(level, x, rows[i]);
@@ -38,18 +48,19 @@ void SenderRows::require(std::span<const std::uint64_t> numbers) {
 
 std::vector<float> SenderRows::areas() const {
     const PointHierarchy& points = basis_.points();
-    std::vector<double> sum(points.end(levels_ - 1), 0.0);
-    for (std::uint32_t patch = 0; patch < grid_.patch_count(); ++patch) {
-        const Place& p = place_[number(patch, levels_ - 1)];
+    const PatchGrid& grid = grid_.back();
+    std::vector<double> sum(points.end(levels() - 1), 0.0);
+    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
+        const Place& p = place_[first_.back() + patch];
         if (p.count == not_made || p.count == 0) continue;
-        const double area = grid_.area(patch);
+        const double area = grid.area(patch);
         for (std::uint32_t e = p.begin; e < p.begin + p.count; ++e)
             sum[entries_[e].index] += area * entries_[e].value;
     }
     // A function whose surroundings no ray met, or one of a coarser level that has no children, gets
     // what its disk would have.
     std::vector<float> areas(sum.size());
-    for (int l = 0; l < levels_; ++l)
+    for (int l = 0; l < levels(); ++l)
         for (std::uint32_t i = points.begin(l); i < points.end(l); ++i)
             areas[i] = static_cast<float>(sum[i] > 0.0 ? sum[i] : points.spacing[l] * points.spacing[l]);
     return areas;

@@ -14,22 +14,27 @@ namespace afterglow {
 /// patch's centre: all hits in a patch see the same row, which is what makes the gather fast.
 class SenderRows {
 public:
-    /// Senders are the levels [0, levels) of the basis. Keeps references.
-    SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_size);
+    /// Senders are the levels [0, levels) of the basis; the patches of a level are at most
+    /// `patch_share` times its spacing long. Keeps references.
+    SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_share = 0.5f);
 
-    const PatchGrid& grid() const { return grid_; }
-    int levels() const { return levels_; }
-
-    /// A patch seen at a level: the row of (patch, level) is number patch * levels() + level.
-    std::uint64_t number(std::uint32_t patch, int level) const {
-        return static_cast<std::uint64_t>(patch) * levels_ + level;
+    int levels() const { return static_cast<int>(grid_.size()); }
+    /// The row with which a level sees the patch of a hit.
+    std::uint32_t number(const Hit& hit, int level) const {
+        return first_[level] + grid_[level].patch_of(hit);
     }
-    /// Makes these rows (repetitions allowed); not to be called concurrently.
-    void require(std::span<const std::uint64_t> numbers);
+    /// Makes these rows (repetitions allowed, no_index is passed over); not to be called concurrently.
+    void require(std::span<const std::uint32_t> numbers);
     /// A row that was required; empty where no function sees the patch.
-    std::span<const BasisEntry> row(std::uint64_t number) const {
+    std::span<const BasisEntry> row(std::uint32_t number) const {
         const Place& p = place_[number];
         return {entries_.data() + p.begin, p.count};
+    }
+    /// Asks for a row's place, or its entries, ahead of use.
+    void prefetch_place(std::uint32_t number) const { __builtin_prefetch(&place_[number]); }
+    void prefetch_row(std::uint32_t number) const {
+        __builtin_prefetch(entries_.data() + place_[number].begin);
+        __builtin_prefetch(entries_.data() + place_[number].begin + 8);
     }
     /// Area that each function of the finest level speaks for, from the patches that were met on
     /// that level; of the level's mean where it was not [world^2]. A number a sender.
@@ -45,8 +50,8 @@ private:
     static constexpr std::uint32_t not_made = ~0u;
     const Surface& surface_;
     const ShepardBasis& basis_;
-    int levels_;
-    PatchGrid grid_;
+    std::vector<PatchGrid> grid_;       // a level each
+    std::vector<std::uint32_t> first_;  // of a level's rows
     std::vector<Place> place_;
     std::vector<BasisEntry> entries_;
     std::size_t made_ = 0, uncovered_ = 0;
