@@ -128,8 +128,11 @@ bool camera_was_given(const CLI::App& command) {
 void add_run_options(CLI::App& command, RunOptions& run) {
     command.add_option("--threads", run.threads, "Threads to use (default 0: all processors)")
         ->check(CLI::Range(0, 4096));
-    command.add_option("--seed", run.seed, "Seed of all random numbers (default 1)");
     command.add_flag("--quiet", run.quiet, "Nothing on stderr but errors");
+}
+
+void add_seed_option(CLI::App& command, RunOptions& run) {
+    command.add_option("--seed", run.seed, "Seed of all random numbers (default 1)");
 }
 
 } // namespace afterglow

@@ -29,12 +29,13 @@ void add_light_options(CLI::App& command, Spotlight& light);
 void add_camera_options(CLI::App& command, Camera& camera);
 bool camera_was_given(const CLI::App& command);
 
-/// --threads, --seed, --quiet.
+/// --threads, --quiet, and --seed for what draws random numbers.
 struct RunOptions {
     int threads = 0; // 0: all processors
     std::uint64_t seed = 1;
     bool quiet = false;
 };
 void add_run_options(CLI::App& command, RunOptions& run);
+void add_seed_option(CLI::App& command, RunOptions& run);
 
 } // namespace afterglow

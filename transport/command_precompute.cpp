@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 
 struct PrecomputeCommand {
     std::string scene, output, report, operator_name = "neumann";
-    double target_error = 0.1, epsilon = 0.0, coarse_radius = 0.0;
+    double target_error = default_target_error, epsilon = 0.0, coarse_radius = 0.0;
     int bounces = 0;
     PrecomputeOptions options;
     RunOptions run;
@@ -217,6 +217,7 @@ void add_precompute_command(CLI::App& app) {
         ->check(CLI::Range(0, most_bounces));
     sub->add_option("--report", command->report, "JSON file for counts and times");
     add_run_options(*sub, command->run);
+    add_seed_option(*sub, command->run);
     sub->callback([sub, command] {
         fill_options(*command, *sub);
         run(*command);

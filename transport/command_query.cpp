@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -17,14 +18,13 @@ namespace {
 struct QueryCommand {
     std::string file, scene, points, output;
     Spotlight light;
-    int threads = 0;
-    bool quiet = false;
+    RunOptions run;
 };
 
 void run(QueryCommand& command) {
     command.light.check();
     check_output(command.output);
-    const ThreadLimit limit(command.threads);
+    const ThreadLimit limit(command.run.threads);
     const std::vector<SurfacePoint> points = read_points_csv(command.points);
     const TransferScene opened(command.file, command.scene);
     const VectorIrradiance field = opened.transport.indirect(opened.surface, command.light);
@@ -41,7 +41,7 @@ void run(QueryCommand& command) {
     write_irradiance_csv(command.output, irradiance);
 
     const auto uncovered = std::count(is_uncovered.begin(), is_uncovered.end(), 1);
-    if (uncovered > 0 && !command.quiet)
+    if (uncovered > 0 && !command.run.quiet)
         std::fprintf(stderr, "afterglow: warning: no function covers %lld of %lld points\n",
                      static_cast<long long>(uncovered), static_cast<long long>(count));
 }
@@ -57,9 +57,7 @@ void add_query_command(CLI::App& app) {
     sub->add_option("-o,--output", command->output, "CSV file of E_r,E_g,E_b")->required();
     sub->add_option("--scene", command->scene, "Where the scene is now");
     add_light_options(*sub, command->light);
-    sub->add_option("--threads", command->threads, "Threads to use (default 0: all processors)")
-        ->check(CLI::Range(0, 4096));
-    sub->add_flag("--quiet", command->quiet, "Nothing on stderr but errors");
+    add_run_options(*sub, command->run);
     sub->callback([command] { run(*command); });
 }
 

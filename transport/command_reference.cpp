@@ -151,6 +151,7 @@ void add_reference_command(CLI::App& app) {
     add_light_options(*sub, command->light);
     add_camera_options(*sub, command->camera);
     add_run_options(*sub, command->run);
+    add_seed_option(*sub, command->run);
     sub->callback([sub, command] {
         if (sub->count("--target-error") > 0 && !(command->target_error > 0.0))
             throw UsageError("--target-error must be positive");

@@ -23,7 +23,7 @@ struct RenderCommand {
     std::string file, scene, output, layer = "indirect";
     Spotlight light;
     Camera camera;
-    int samples = RenderOptions().samples;
+    int samples = 4;
     double exposure = 0.18;
     RunOptions run;
 };
@@ -41,7 +41,7 @@ std::map<std::string, std::string> attributes(const RenderCommand& command,
         {"afterglow.transfer_options", provenance.options},
         {"afterglow.scene", opened.scene.name},
         {"afterglow.scene_hash", provenance.scene_hash},
-        {"afterglow.seed", std::to_string(command.run.seed)},
+        {"afterglow.seed", std::to_string(provenance.seed)},
         {"afterglow.layer", command.layer},
         {"afterglow.samples_per_pixel", std::to_string(command.samples)},
         {"afterglow.uncovered_pixels", std::to_string(uncovered_pixels)}});
@@ -62,9 +62,8 @@ void run(RenderCommand& command) {
     if (layer != Layer::direct)
         field = opened.transport.indirect(opened.surface, command.light, &neumann);
     const auto lit = Clock::now();
-    RenderedPicture picture =
-        render_picture(opened.surface, opened.display, field, command.light, command.camera, layer,
-                       {command.samples, command.run.seed});
+    RenderedPicture picture = render_picture(opened.surface, opened.display, field, command.light,
+                                             command.camera, layer, command.samples);
     const auto rendered = Clock::now();
     picture.image.attributes = attributes(command, opened, picture.uncovered_pixels);
     write_image(command.output, picture.image, PixelType::half_float,

@@ -10,6 +10,16 @@ namespace {
 
 constexpr Index pixels_at_once = 64;
 
+/// Places in the pixel [0, 1)^2: each of `samples` columns and rows of equal width holds one where
+/// their number is a power of two. A pattern that changed from pixel to pixel would fray edges.
+std::vector<Vec2> pixel_pattern(int samples) {
+    if (samples == 1) return {Vec2(0.5f, 0.5f)};
+    std::vector<Vec2> pattern;
+    for (int k = 0; k < samples; ++k)
+        pattern.push_back(scrambled_sobol2(static_cast<std::uint32_t>(k), 1));
+    return pattern;
+}
+
 /// What one sample of a pixel adds, and whether the display had something to say there.
 struct Shader {
     const Surface& surface;
@@ -33,26 +43,23 @@ struct Shader {
 
 RenderedPicture render_picture(const Surface& surface, const Display& display,
                                const VectorIrradiance& field, const Spotlight& light,
-                               const Camera& camera, Layer layer, const RenderOptions& options) {
+                               const Camera& camera, Layer layer, int samples) {
     const Shader shade{surface, display, field, light, layer};
+    const std::vector<Vec2> pattern = pixel_pattern(samples);
     const Index pixel_count = static_cast<Index>(camera.width) * camera.height;
-    const auto samples = static_cast<std::size_t>(options.samples);
     RenderedPicture result;
     result.image = Image(camera.width, camera.height);
     std::vector<std::uint8_t> is_uncovered(static_cast<std::size_t>(pixel_count), 0);
     parallel_ranges(pixel_count, pixels_at_once, [&](Index begin, Index end) {
-        std::vector<Ray> rays(samples);
-        std::vector<Hit> hits(samples);
+        std::vector<Ray> rays(pattern.size());
+        std::vector<Hit> hits(pattern.size());
         for (Index pixel = begin; pixel < end; ++pixel) {
-            const auto left = static_cast<int>(pixel % camera.width);
-            const auto top = static_cast<int>(pixel / camera.width);
-            const std::uint64_t pixel_seed =
-                hash64(options.seed, static_cast<std::uint64_t>(pixel));
-            for (std::size_t k = 0; k < samples; ++k) {
-                const Vec2 u = scrambled_sobol2(static_cast<std::uint32_t>(k), pixel_seed);
-                rays[k] = {camera.position, camera.direction(static_cast<float>(left) + u.x(),
-                                                             static_cast<float>(top) + u.y())};
-            }
+            const auto x = static_cast<int>(pixel % camera.width);
+            const auto y = static_cast<int>(pixel / camera.width);
+            for (std::size_t k = 0; k < rays.size(); ++k)
+                rays[k] = {camera.position,
+                           camera.direction(static_cast<float>(x) + pattern[k].x(),
+                                            static_cast<float>(y) + pattern[k].y())};
             surface.closest_hits(rays, hits);
             Rgb sum = Rgb::Zero();
             for (const Hit& hit : hits) {
@@ -61,7 +68,7 @@ RenderedPicture render_picture(const Surface& surface, const Display& display,
                 sum += shade(hit, covered);
                 if (!covered) is_uncovered[static_cast<std::size_t>(pixel)] = 1;
             }
-            result.image.set_pixel(left, top, sum / static_cast<float>(samples));
+            result.image.set_pixel(x, y, sum / static_cast<float>(samples));
         }
     });
     for (const std::uint8_t uncovered : is_uncovered)

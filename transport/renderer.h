@@ -11,11 +11,6 @@
 
 namespace afterglow {
 
-struct RenderOptions {
-    int samples = 4; // of a pixel, stratified over its area (box filter)
-    std::uint64_t seed = 1;
-};
-
 struct RenderedPicture {
     Image image; // no attributes; black where the camera sees nothing
     /// Pixels with a sample on a surface that no function covers: there is no indirect light there.
@@ -24,9 +19,9 @@ struct RenderedPicture {
 
 /// The picture of render_reference() by precomputed transport. `field`, as from
 /// LightTransport::indirect() under the same light, is not looked at for Layer::direct, and may be
-/// empty then. Deterministic on any number of threads.
+/// empty then. `samples` a pixel, in the same stratified pattern in each: box filter.
 RenderedPicture render_picture(const Surface& surface, const Display& display,
                                const VectorIrradiance& field, const Spotlight& light,
-                               const Camera& camera, Layer layer, const RenderOptions& options);
+                               const Camera& camera, Layer layer, int samples);
 
 } // namespace afterglow
