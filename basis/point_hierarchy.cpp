@@ -53,7 +53,8 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
         const bool by_openness = options.openness_density > 0.0f && l == options.levels - 1;
         PoissonDiskOptions disk_options;
         disk_options.spacing = spacing;
-        disk_options.placement_power = options.shape.placement_power;
+        disk_options.placement_power
+            = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
         disk_options.openness_density = by_openness ? options.openness_density : 0.0f;
         const PoissonDisk disk = poisson_disk(source, disk_options);

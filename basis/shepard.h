@@ -22,12 +22,14 @@ struct BasisShape {
     /// w_j(x) = K(d_j(x) / r_j) max(0, n . n_j)^weight_power [LZT08, eq. (8): power 2].
     int weight_power = 8;
     /// D(x, y) = min(d_x(y), d_y(x)) / max(0, n_x . n_y)^placement_power [LZT08, eq. (11): power 2].
-    int placement_power = 16;
+    int placement_power = 4;
+    /// The same on a finest level that is placed by openness.
+    int openness_placement_power = 16;
     /// Support r_j = reach * R_level, linear from the coarsest level to the finest.
     float reach_coarsest = 1.5f, reach_finest = 1.5f;
 
     /// As printed: cos^2 in both places, supports from 1.5 to 2.5 R.
-    static BasisShape paper() { return {2, 2, 1.5f, 2.5f}; }
+    static BasisShape paper() { return {2, 2, 2, 1.5f, 2.5f}; }
 };
 
 /// max(0, c)^power for the small even powers in use.

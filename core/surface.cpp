@@ -82,7 +82,7 @@ Hit Surface::closest_hit(const Ray& ray) const {
                          + query.hit.Ng_z * ray.direction.z();
     const float length = std::hypot(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
     return {query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v, facing > 0.0f,
-            std::abs(facing) / length};
+            length > 0.0f ? std::abs(facing) / length : 1.0f};
 }
 
 void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const {
@@ -124,7 +124,7 @@ void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const
                                   + packet.hit.Ng_y[k] * packet.hit.Ng_y[k]
                                   + packet.hit.Ng_z[k] * packet.hit.Ng_z[k];
             hit = {packet.ray.tfar[k], packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k],
-                   facing > 0.0f,      std::abs(facing) / std::sqrt(length2)};
+                   facing > 0.0f,      length2 > 0.0f ? std::abs(facing) / std::sqrt(length2) : 1.0f};
         }
     }
 }

@@ -33,7 +33,7 @@ struct Footprint {
     int levels = 1;
 
     float level(const Hit& hit) const {
-        const float size = angle * hit.distance / std::max(hit.cosine, 0.3f);
+        const float size = std::max(angle * hit.distance / std::max(hit.cosine, 0.3f), 1e-30f);
         return std::clamp(std::log2(coarsest_spacing / size), 0.0f, static_cast<float>(levels - 1));
     }
 };
