@@ -20,39 +20,22 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// A stored row as its descendants read it when they predict.
-struct AncestorRow {
-    std::vector<std::uint32_t> sender; // the coarsest senders in front, then all others,
-    std::vector<LinkVector> value;     // the largest first
-    std::size_t coarsest = 0;          // how many stand in front
+/// The links of a receiver as its children read them when they predict: all that it and its
+/// ancestors stored, summed up by push, but for what is negligible to the children.
+struct PushedRow {
+    std::vector<std::uint32_t> sender;
+    std::vector<LinkVector> value;
 };
 
 LinkVector to_float(const LinkValue& v) {
     return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), 0.0f};
 }
 
-AncestorRow make_ancestor_row(const std::vector<LinkEntry>& kept, std::uint32_t coarsest_senders) {
-    struct Sized {
-        float size2;
-        std::uint32_t place;
-    };
-    AncestorRow row;
-    std::vector<Sized> order;
-    for (std::uint32_t k = 0; k < kept.size(); ++k) {
-        const bool coarsest = kept[k].index < coarsest_senders;
-        row.coarsest += coarsest;
-        order.push_back({coarsest ? std::numeric_limits<float>::infinity()
-                                  : to_float(kept[k].value).squaredNorm(),
-                         k});
-    }
-    std::stable_sort(order.begin(), order.end(),
-                     [](const Sized& a, const Sized& b) { return a.size2 > b.size2; });
-    for (const Sized& s : order) {
-        row.sender.push_back(kept[s.place].index);
-        row.value.push_back(to_float(kept[s.place].value));
-    }
-    return row;
-}
+/// Thresholds of one receiver level, on the size of a link.
+struct LevelThresholds {
+    float kept;       // what a link must exceed to be stored
+    float negligible; // what a pushed link must exceed to be predicted for the children; 0: no children
+};
 
 /// What a thread needs to turn samples into the row of a receiver.
 class RowMaker {
@@ -60,16 +43,19 @@ public:
     RowMaker(const PointHierarchy& points, const PushOperator& push, const SenderRows& rows)
         : points_(points), push_(push), rows_(rows), sender_levels_(rows.levels()),
           link_(points.end(rows.levels() - 1), LinkVector::Zero()),
-          ancestor_(points.size(), 0.0f) {}
+          predicted_(points.end(rows.levels() - 1), LinkVector::Zero()) {}
 
-    /// The kept links of receiver i on `level`. `ancestors`: rows of all coarser levels.
+    /// Fills `kept` with the links of receiver i that are stored, and `pushed` where there are
+    /// children. `parents`: the pushed rows of the level above, its first point first.
     void make(Index i, int level, std::span<const GatherSample> samples,
-              const std::vector<AncestorRow>& ancestors, float smallest, std::vector<LinkEntry>& kept,
-              std::uint64_t& links_before) {
+              std::span<const PushedRow> parents, const LevelThresholds& thresholds,
+              std::vector<LinkEntry>& kept, PushedRow& pushed, std::uint64_t& links_before) {
         gather(samples);
-        subtract_prediction(i, level, ancestors, smallest);
-        threshold(level, smallest, kept, links_before);
+        if (level > 0) subtract_prediction(i, points_.begin(level - 1), parents);
+        threshold(level, thresholds.kept, kept, links_before);
+        if (thresholds.negligible > 0.0f) push_down(kept, thresholds.negligible, pushed);
         link_.clear();
+        predicted_.clear();
     }
 
 private:
@@ -105,29 +91,17 @@ private:
             });
     }
 
-    /// Subtracts what the stored rows of all ancestors predict by push. Links far below the
-    /// receiver's own threshold decide nothing and are passed over; those of the coarsest senders all
-    /// count, because the response to uniform light must stay exact.
-    void subtract_prediction(Index i, int level, const std::vector<AncestorRow>& ancestors,
-                             float smallest) {
-        constexpr float negligible_share = 0.125f;
-        const float negligible2 = negligible_share * negligible_share * smallest * smallest;
+    /// Subtracts what the parents predict.
+    void subtract_prediction(Index i, std::uint32_t first_parent, std::span<const PushedRow> parents) {
         const auto index = push_.parents.indices(i);
         const auto weight = push_.parents.values(i);
-        for (std::size_t e = 0; e < index.size(); ++e) ancestor_.at(index[e]) += weight[e];
-        for (int l = level - 1; l >= 0; --l)
-            ancestor_.for_each(points_.begin(l), points_.end(l), [&](std::uint32_t k, float share) {
-                if (share == 0.0f) return;
-                const AncestorRow& row = ancestors[k];
-                for (std::size_t e = 0; e < row.sender.size(); ++e) {
-                    if (e >= row.coarsest && row.value[e].squaredNorm() < negligible2) break;
-                    link_.at(row.sender[e]) -= share * row.value[e];
-                }
-                const auto above = push_.parents.indices(k);
-                const auto part = push_.parents.values(k);
-                for (std::size_t e = 0; e < above.size(); ++e) ancestor_.at(above[e]) += share * part[e];
-            });
-        ancestor_.clear();
+        for (std::size_t e = 0; e < index.size(); ++e) {
+            const PushedRow& row = parents[index[e] - first_parent];
+            for (std::size_t k = 0; k < row.sender.size(); ++k)
+                predicted_.at(row.sender[k]) += weight[e] * row.value[k];
+        }
+        predicted_.for_each(0, points_.end(sender_levels_ - 1),
+                            [&](std::uint32_t j, const LinkVector& value) { link_.at(j) -= value; });
     }
 
     void threshold(int level, float smallest, std::vector<LinkEntry>& kept, std::uint64_t& links_before) {
@@ -154,12 +128,26 @@ private:
         });
     }
 
+    /// Prediction and stored links together. Links to the coarsest senders all stay, so that the
+    /// response to uniform light is exact on every level.
+    void push_down(const std::vector<LinkEntry>& kept, float negligible, PushedRow& pushed) {
+        for (const LinkEntry& link : kept) predicted_.at(link.index) += to_float(link.value);
+        const std::uint32_t coarsest = points_.end(0);
+        predicted_.for_each(0, points_.end(sender_levels_ - 1),
+                            [&](std::uint32_t j, const LinkVector& value) {
+                                const float size2 = value.squaredNorm();
+                                if (size2 == 0.0f || (j >= coarsest && size2 < negligible * negligible)) return;
+                                pushed.sender.push_back(j);
+                                pushed.value.push_back(value);
+                            });
+    }
+
     const PointHierarchy& points_;
     const PushOperator& push_;
     const SenderRows& rows_;
     int sender_levels_;
     Accumulator<LinkVector> link_;
-    Accumulator<float> ancestor_;
+    Accumulator<LinkVector> predicted_;
 };
 
 } // namespace
@@ -168,7 +156,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
                  SenderRows& rows, const LinkOptions& options, LinkStatistics& statistics) {
     constexpr Index samples_at_once = 1 << 20, grain = 16;
     std::vector<std::vector<LinkEntry>> done(points.size());
-    std::vector<AncestorRow> ancestors(points.begin(points.levels() - 1));
+    std::vector<PushedRow> parents, pushed;
     std::vector<GatherSample> samples;
     std::vector<std::uint32_t> needed;
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
@@ -176,7 +164,13 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
         const GatherDirections directions(
             std::min(std::max(options.most_rays, options.rays), options.rays << (points.levels() - 1 - l)),
             hash64(options.seed, static_cast<std::uint64_t>(l)));
-        const float smallest = options.threshold * std::pow(points.spacing.back() / points.spacing[l], options.level_power);
+        // A pushed link an eighth of the children's threshold decides nothing there.
+        const float kept = options.threshold * points.spacing.back() / points.spacing[l];
+        const bool has_children = l + 1 < points.levels();
+        const LevelThresholds thresholds{
+            kept, has_children ? 0.125f * kept * points.spacing[l] / points.spacing[l + 1] : 0.0f};
+        parents = std::move(pushed);
+        pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
         std::vector<std::uint64_t> before(static_cast<std::size_t>((batch + grain - 1) / grain));
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
@@ -204,15 +198,12 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
                     maker.make(begin + r, l,
                                std::span(samples).subspan(static_cast<std::size_t>(r) * directions.rays(),
                                                           static_cast<std::size_t>(directions.rays())),
-                               ancestors, smallest, done[begin + r], before[first / grain]);
+                               parents, thresholds, done[begin + r],
+                               pushed[begin + r - points.begin(l)], before[first / grain]);
             });
             for (const std::uint64_t b : before) statistics.links_before += b;
             statistics.links_seconds += seconds_since(start);
         }
-        if (l + 1 < points.levels())
-            parallel_for(points.end(l) - points.begin(l), [&](Index k) {
-                ancestors[points.begin(l) + k] = make_ancestor_row(done[points.begin(l) + k], points.end(0));
-            });
         statistics.links.push_back(0);
         for (Index i = points.begin(l); i < points.end(l); ++i) statistics.links.back() += done[i].size();
     }

@@ -24,11 +24,10 @@ struct LinkOptions {
     int rays = 512; // of a receiver on the finest level; a power of two; twice as many a level up
     int most_rays = 16384;
     float footprint_angle = 0.05f; // see Footprint
-    /// A link d is kept where |d| R_l / R_0 > threshold (R_l: spacing of the receiver's level). What
-    /// is dropped of the coarsest senders goes onto those that stay, so that the response to uniform
+    /// A link d of a receiver on level l is kept where |d| R_l > threshold R_L (R_L: spacing of the
+    /// finest level), so that every stored link buys about the same error over the scene. What is dropped of the coarsest senders goes onto those that stay, so that the response to uniform
     /// light stays exact.
     float threshold = 5e-3f;
-    float level_power = 1.0f;
     std::uint64_t seed = 1;
 };
 
