@@ -104,28 +104,45 @@ private:
                             [&](std::uint32_t j, const LinkVector& value) { link_.at(j) -= value; });
     }
 
+    /// Moves to `kept` what is stored of link_.
     void threshold(int level, float smallest, std::vector<LinkEntry>& kept, std::uint64_t& links_before) {
         const std::uint32_t coarsest = points_.end(0), all = points_.end(sender_levels_ - 1);
-        const float smallest2 = smallest * smallest;
+        // The coarsest senders: what is dropped of them goes onto those that stay, in proportion to
+        // their size; more stay, the largest first, until what is dropped is itself small.
+        candidates_.clear();
         LinkVector dropped = LinkVector::Zero();
-        float kept_size = 0.0f;
-        link_.for_each(0, coarsest, [&](std::uint32_t, const LinkVector& d) {
-            const float d2 = d.squaredNorm();
-            if (level == 0 || d2 > smallest2)
-                kept_size += std::sqrt(d2);
-            else
-                dropped += d;
+        link_.for_each(0, coarsest, [&](std::uint32_t j, const LinkVector& d) {
+            const float size = d.norm();
+            if (size == 0.0f) return;
+            candidates_.push_back({size, j});
+            dropped += d;
         });
-        if (kept_size > 0.0f) dropped /= kept_size;
+        std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& a, const Candidate& b) {
+            return a.size != b.size ? a.size > b.size : a.sender < b.sender;
+        });
+        std::size_t stay = 0;
+        float stay_size = 0.0f;
+        while (stay < candidates_.size()
+               && (level == 0 || candidates_[stay].size > smallest || dropped.norm() > smallest)) {
+            dropped -= link_.at(candidates_[stay].sender);
+            stay_size += candidates_[stay++].size;
+        }
+        candidates_.resize(stay);
+        std::sort(candidates_.begin(), candidates_.end(),
+                  [](const Candidate& a, const Candidate& b) { return a.sender < b.sender; });
+        for (const Candidate& c : candidates_)
+            store(c.sender, link_.at(c.sender) + (c.size / stay_size) * dropped, kept);
+
         link_.for_each(0, all, [&](std::uint32_t j, const LinkVector& d) {
-            const float d2 = d.squaredNorm();
-            if (d2 == 0.0f) return;
+            const float size2 = d.squaredNorm();
+            if (size2 == 0.0f) return;
             ++links_before;
-            const bool keep = d2 > smallest2 || (level == 0 && j < coarsest);
-            if (!keep) return;
-            const LinkVector value = j < coarsest ? LinkVector(d + std::sqrt(d2) * dropped) : d;
-            kept.push_back({j, {Eigen::half(value.x()), Eigen::half(value.y()), Eigen::half(value.z())}});
+            if (j >= coarsest && size2 > smallest * smallest) store(j, d, kept);
         });
+    }
+
+    static void store(std::uint32_t sender, const LinkVector& d, std::vector<LinkEntry>& kept) {
+        kept.push_back({sender, {Eigen::half(d.x()), Eigen::half(d.y()), Eigen::half(d.z())}});
     }
 
     /// Prediction and stored links together. Links to the coarsest senders all stay, so that the
@@ -148,6 +165,11 @@ private:
     int sender_levels_;
     Accumulator<LinkVector> link_;
     Accumulator<LinkVector> predicted_;
+    struct Candidate {
+        float size;
+        std::uint32_t sender;
+    };
+    std::vector<Candidate> candidates_;
 };
 
 } // namespace
