@@ -1,0 +1,318 @@
+#include "core/builtin_scenes.h"
+#include "core/parallel.h"
+#include "core/sampling.h"
+#include "tests/support/gather_oracle.h"
+#include "tests/support/surface_samples.h"
+#include "transport/links.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+namespace afterglow {
+namespace {
+
+/// A built-in scene with a small basis over it.
+struct Example {
+    Scene scene;
+    Surface surface;
+    PointHierarchy points;
+    int sender_levels;
+    ShepardBasis basis;
+    PushOperator push;
+
+    Example(const std::string& name, float coarse_radius, int receiver_levels, int sender_levels_)
+        : scene(make_builtin_scene(name)), surface(scene),
+          points(make_points(surface, coarse_radius, receiver_levels)),
+          sender_levels(sender_levels_), basis(points, surface, true),
+          push(make_push_operator(basis)) {}
+
+    static PointHierarchy make_points(const Surface& surface, float coarse_radius, int levels) {
+        CandidateSource source(surface, {*surface.scene().viewpoint}, 1);
+        HierarchyOptions options;
+        options.coarse_radius = coarse_radius;
+        options.levels = levels;
+        options.openness_density = 0.0f;
+        return build_hierarchy(source, options);
+    }
+
+    Links links(const LinkOptions& options, float patch_share,
+                LinkStatistics* statistics = nullptr) const {
+        LinkStatistics unused;
+        SenderRows rows(surface, basis, sender_levels, patch_share);
+        return make_links(surface, points, push, rows, options, statistics ? *statistics : unused);
+    }
+
+    std::uint32_t senders() const { return points.end(sender_levels - 1); }
+
+    /// Vector irradiance at all receivers by sender coefficients: T, then push. 3 x receivers.
+    Eigen::Matrix3Xd field(const Links& links, const Eigen::VectorXd& coefficients) const {
+        Eigen::Matrix3Xd v(3, points.size());
+        for (Index i = 0; i < v.cols(); ++i) {
+            Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+            for (std::size_t k = 0; k < links.indices(i).size(); ++k) {
+                const LinkValue& t = links.values(i)[k];
+                sum += Eigen::Vector3d(static_cast<float>(t[0]), static_cast<float>(t[1]),
+                                       static_cast<float>(t[2]))
+                       * coefficients[links.indices(i)[k]];
+            }
+            for (std::size_t k = 0; k < push.parents.indices(i).size(); ++k)
+                sum += push.parents.values(i)[k] * v.col(push.parents.indices(i)[k]);
+            v.col(i) = sum;
+        }
+        return v;
+    }
+
+    /// Coefficients of sender values, from the definition of push.
+    Eigen::VectorXd difference(const Eigen::VectorXd& values) const {
+        Eigen::VectorXd c = values;
+        for (std::uint32_t i = 0; i < senders(); ++i)
+            for (std::size_t k = 0; k < push.parents.indices(i).size(); ++k)
+                c[i] -= push.parents.values(i)[k] * values[push.parents.indices(i)[k]];
+        return c;
+    }
+
+    Eigen::VectorXd uniform() const {
+        Eigen::VectorXd ones = Eigen::VectorXd::Zero(senders());
+        ones.head(points.end(0)).setOnes();
+        return ones;
+    }
+};
+
+/// Counts how far two estimates are apart in standard errors. With many independent comparisons the
+/// mean of z^2 is 1 and none is beyond five.
+class Agreement {
+public:
+    void compare(double a, double error_a, double b, double error_b, const std::string& what) {
+        const double error = std::hypot(error_a, error_b);
+        if (!(error > 0.0)) return;
+        const double z = (a - b) / error;
+        EXPECT_LT(std::abs(z), 5.0)
+            << what << ": " << a << " +- " << error_a << " against " << b << " +- " << error_b;
+        ++count_;
+        sum_ += z;
+        squares_ += z * z;
+    }
+    int count() const { return count_; }
+    double mean_square() const { return squares_ / count_; }
+    double mean() const { return sum_ / count_; }
+
+private:
+    int count_ = 0;
+    double sum_ = 0.0, squares_ = 0.0;
+};
+
+TEST(Links, AreThePlainGatherOfEachSender) {
+    // The rows of the coarsest receivers, nothing dropped, from eight seeds, against plain Monte
+    // Carlo: single senders and random fields. Patches so small that their size does not show.
+    const Example example("builtin:cornell", 0.25f, 1, 1);
+    const std::uint32_t senders = example.senders();
+    ASSERT_GT(senders, 20u);
+    const Footprint footprint{0.05f, example.points.spacing[0], 1};
+    Eigen::MatrixXd functionals = Eigen::MatrixXd::Identity(senders, senders + 8);
+    Rng rng(5, 0);
+    functionals.rightCols(8) = Eigen::MatrixXd::NullaryExpr(
+        senders, 8, [&] { return static_cast<double>(rng.uniform()) - 0.3; });
+
+    constexpr int seeds = 8;
+    std::vector<Eigen::ArrayXXd> measured(example.points.size(),
+                                          Eigen::ArrayXXd::Zero(senders + 8, seeds));
+    for (int seed = 0; seed < seeds; ++seed) {
+        LinkOptions options;
+        options.rays = 1024;
+        options.threshold = 0.0f;
+        options.seed = 100 + seed;
+        const Links links = example.links(options, 0.03f);
+        for (Index f = 0; f < functionals.cols(); ++f) {
+            const Eigen::Matrix3Xd v = example.field(links, functionals.col(f));
+            for (std::uint32_t i = 0; i < example.points.size(); ++i)
+                measured[i](f, seed) = v.col(i).dot(example.points.normal.col(i).cast<double>());
+        }
+    }
+    Agreement single, fields;
+    for (std::uint32_t i = 0; i < example.points.size(); i += 3) {
+        const MeanAndError expected =
+            irradiance_by_plain_gather(example.surface, example.basis, footprint,
+                                       example.points.point(i), functionals, 20'000, 1000 + i);
+        const MeanAndError found = over_repetitions(measured[i]);
+        for (Index f = 0; f < functionals.cols(); ++f) {
+            // Senders that hardly any ray meets have no normal distribution. Half floats round to
+            // 2^-11 of each link.
+            if (f < senders && expected.mean[f] < 0.01) continue;
+            (f < senders ? single : fields)
+                .compare(found.mean[f], found.error[f] + 2e-4 * std::abs(found.mean[f]),
+                         expected.mean[f], expected.error[f],
+                         "receiver " + std::to_string(i) + ", functional " + std::to_string(f));
+        }
+    }
+    EXPECT_GT(single.count(), 100);
+    EXPECT_LT(std::abs(single.mean()), 4.0 / std::sqrt(single.count()));
+    EXPECT_LT(std::abs(fields.mean()), 4.0 / std::sqrt(fields.count()));
+    EXPECT_LT(single.mean_square(), 1.3);
+    EXPECT_LT(fields.mean_square(), 1.8);
+}
+
+TEST(Links, OfEveryLevelAddUpToThePlainGather) {
+    // Differenced, pushed and with three levels of senders, to smooth and rough sender values.
+    const Example example("builtin:cornell", 0.25f, 3, 2);
+    const Footprint footprint{0.2f, example.points.spacing[0], 2};
+    const std::uint32_t senders = example.senders();
+    Eigen::MatrixXd values(senders, 6);
+    Rng rng(6, 0);
+    for (std::uint32_t j = 0; j < senders; ++j) {
+        const Vec3 x = example.points.position.col(j);
+        values.row(j) << 1.0, x.x(), x.y(), std::sin(20.0 * x.z()), rng.uniform(), rng.uniform();
+    }
+    constexpr int seeds = 8;
+    std::vector<Eigen::ArrayXXd> measured(example.points.size(), Eigen::ArrayXXd::Zero(6, seeds));
+    for (int seed = 0; seed < seeds; ++seed) {
+        LinkOptions options;
+        options.rays = 256;
+        options.threshold = 0.0f;
+        options.footprint_angle = footprint.angle;
+        options.seed = 200 + seed;
+        const Links links = example.links(options, 0.03f);
+        for (Index f = 0; f < 6; ++f) {
+            const Eigen::Matrix3Xd v = example.field(links, example.difference(values.col(f)));
+            for (std::uint32_t i = 0; i < example.points.size(); ++i)
+                measured[i](f, seed) = v.col(i).dot(example.points.normal.col(i).cast<double>());
+        }
+    }
+    Agreement agreement;
+    for (int level = 0; level < 3; ++level)
+        for (std::uint32_t k = 0; k < 20; ++k) {
+            const std::uint32_t count = example.points.end(level) - example.points.begin(level);
+            const std::uint32_t i = example.points.begin(level) + k * count / 20;
+            const MeanAndError expected =
+                irradiance_by_plain_gather(example.surface, example.basis, footprint,
+                                           example.points.point(i), values, 10'000, 2000 + i);
+            const MeanAndError found = over_repetitions(measured[i]);
+            for (Index f = 0; f < 6; ++f)
+                agreement.compare(found.mean[f], found.error[f] + 3e-4 * std::abs(found.mean[f]),
+                                  expected.mean[f], expected.error[f],
+                                  "receiver " + std::to_string(i) + " on level "
+                                      + std::to_string(level) + ", field " + std::to_string(f));
+        }
+    EXPECT_LT(std::abs(agreement.mean()), 0.3); // the six fields of a receiver share their rays
+    EXPECT_LT(agreement.mean_square(), 1.5);
+}
+
+TEST(Links, AnswerUniformLightExactlyWhateverTheThreshold) {
+    // In a closed room whose senders all carry radiosity 1 the vector irradiance is n.
+    const Example example("builtin:two_rooms", 1.0f, 4, 3);
+    const Eigen::Matrix3Xd normals = example.points.normal.cast<double>();
+    Eigen::Matrix3Xd unthresholded;
+    for (const float threshold : {0.0f, 1e-3f, 4e-3f, 1.6e-2f}) {
+        LinkOptions options;
+        options.rays = 256;
+        options.threshold = threshold;
+        const Links links = example.links(options, 0.5f);
+        const Eigen::Matrix3Xd v = example.field(links, example.uniform());
+        const Eigen::ArrayXd irradiance = v.cwiseProduct(normals).colwise().sum().transpose();
+        // Sampling: 256 stratified rays a receiver.
+        EXPECT_NEAR(irradiance.mean(), 1.0, 2e-3) << "threshold " << threshold;
+        EXPECT_LT(std::sqrt((irradiance - 1.0).square().mean()), 0.02);
+        EXPECT_LT((irradiance - 1.0).abs().maxCoeff(), 0.1) << "threshold " << threshold;
+        if (threshold == 0.0f) {
+            unthresholded = v;
+            continue;
+        }
+        const Eigen::ArrayXd change = (v - unthresholded).colwise().norm().transpose();
+        // Exact but for half floats (2^-11 of each link) where any coarsest sender's link is kept;
+        // where none is, what is dropped together is below the threshold.
+        EXPECT_LT(change.mean(), 0.1f * threshold + 5e-4f) << "threshold " << threshold;
+        EXPECT_LT(change.maxCoeff(), threshold + 3e-3f) << "threshold " << threshold;
+    }
+}
+
+TEST(Links, BecomeFewerAndLessExactAsTheThresholdGrows) {
+    const Example example("builtin:cornell", 0.2f, 3, 2);
+    Eigen::VectorXd values(example.senders());
+    for (Index j = 0; j < values.size(); ++j)
+        values[j] = example.points.position(1, j) > 0.3f ? 1.0 : 0.2;
+    const Eigen::VectorXd coefficients = example.difference(values);
+    LinkOptions options;
+    options.rays = 256;
+    options.threshold = 0.0f;
+    LinkStatistics statistics;
+    const Links all = example.links(options, 0.5f, &statistics);
+    EXPECT_EQ(statistics.links_before, all.entries());
+    const Eigen::Matrix3Xd exact = example.field(all, coefficients);
+    std::uint64_t last_count = all.entries();
+    double last_error = 0.0;
+    for (const float threshold : {5e-4f, 2e-3f, 8e-3f}) {
+        options.threshold = threshold;
+        LinkStatistics s;
+        const Links links = example.links(options, 0.5f, &s);
+        const double error = (example.field(links, coefficients) - exact).norm() / exact.norm();
+        EXPECT_LT(links.entries(), 0.8 * last_count);
+        EXPECT_GT(error, last_error);
+        EXPECT_LT(error, 10.0 * threshold);
+        last_count = links.entries();
+        last_error = error;
+        std::uint64_t counted = 0;
+        for (const std::uint64_t n : s.links)
+            counted += n;
+        EXPECT_EQ(counted, links.entries());
+    }
+}
+
+TEST(Links, KeepEveryCoarseSenderThatTheCoarsestReceiversSee) {
+    const Example example("builtin:furnace", 0.8f, 2, 2);
+    LinkOptions options;
+    options.rays = 1024;
+    options.threshold = 0.0f;
+    const Links all = example.links(options, 0.5f);
+    options.threshold = 0.1f;
+    const Links kept = example.links(options, 0.5f);
+    for (std::uint32_t i = 0; i < example.points.end(0); ++i) {
+        std::size_t before = 0, after = 0;
+        for (const std::uint32_t j : all.indices(i))
+            before += j < example.points.end(0);
+        for (const std::uint32_t j : kept.indices(i))
+            after += j < example.points.end(0);
+        EXPECT_EQ(before, after) << "receiver " << i;
+        EXPECT_GT(after, 0u);
+    }
+}
+
+TEST(Links, HaveSortedRowsOfSenders) {
+    const Example example("builtin:cornell", 0.2f, 3, 2);
+    LinkOptions options;
+    options.rays = 64;
+    const Links links = example.links(options, 0.5f);
+    ASSERT_EQ(links.rows(), example.points.size());
+    for (Index i = 0; i < links.rows(); ++i) {
+        const auto index = links.indices(i);
+        for (std::size_t k = 0; k < index.size(); ++k) {
+            EXPECT_LT(index[k], example.senders());
+            if (k > 0) {
+                EXPECT_LT(index[k - 1], index[k]);
+            }
+        }
+    }
+}
+
+TEST(Links, DependOnTheSeedButNotOnThreads) {
+    const Example example("builtin:cornell", 0.2f, 3, 2);
+    const auto make = [&](int threads, std::uint64_t seed) {
+        const ThreadLimit limit(threads);
+        LinkOptions options;
+        options.rays = 64;
+        options.seed = seed;
+        return example.links(options, 0.5f);
+    };
+    const auto equal = [](const Links& a, const Links& b) {
+        if (a.entries() != b.entries() || a.rows() != b.rows()) return false;
+        for (std::uint64_t k = 0; k < a.entries(); ++k)
+            if (a.index[k] != b.index[k] || a.value[k] != b.value[k]) return false;
+        return true;
+    };
+    const Links one = make(1, 3);
+    EXPECT_TRUE(equal(one, make(2, 3)));
+    EXPECT_FALSE(equal(one, make(1, 4)));
+}
+
+} // namespace
+} // namespace afterglow

@@ -1,0 +1,122 @@
+#include "core/builtin_scenes.h"
+#include "core/sampling.h"
+#include "transport/patches.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace afterglow {
+namespace {
+
+/// One triangle in the plane z = 0.
+Scene single_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
+    Scene scene;
+    scene.positions = {a, b, c};
+    scene.triangles = {{0, 1, 2}};
+    scene.material_index = {0};
+    scene.materials = {{}};
+    return scene;
+}
+
+/// A uniform random place on a triangle, seen from a random side.
+Hit random_hit(std::uint32_t triangle, Rng& rng) {
+    const float s = std::sqrt(rng.uniform()), r = rng.uniform();
+    Hit hit;
+    hit.distance = 1.0f;
+    hit.primitive = triangle;
+    hit.u = s * (1.0f - r);
+    hit.v = s * r;
+    hit.back_side = rng.uniform() < 0.5f;
+    return hit;
+}
+
+Vec3 place(const Scene& scene, const Hit& hit) {
+    const Triangle& t = scene.triangles[hit.primitive];
+    return (1.0f - hit.u - hit.v) * scene.positions[t[0]] + hit.u * scene.positions[t[1]]
+           + hit.v * scene.positions[t[2]];
+}
+
+void expect_centres_close_to_their_hits(const Scene& scene, float size, const std::string& what) {
+    const PatchGrid grid(scene, size);
+    Rng rng(3, 0);
+    for (int k = 0; k < 20'000; ++k) {
+        const Hit hit = random_hit(static_cast<std::uint32_t>(k % scene.triangles.size()), rng);
+        const std::uint32_t patch = grid.patch_of(hit);
+        ASSERT_LT(patch, grid.patch_count());
+        const Hit center = grid.center(patch);
+        ASSERT_EQ(center.primitive, hit.primitive) << what;
+        ASSERT_EQ(center.back_side, hit.back_side) << what;
+        ASSERT_EQ(patch % 2, static_cast<std::uint32_t>(hit.back_side));
+        ASSERT_GE(center.u, 0.0f);
+        ASSERT_GE(center.v, 0.0f);
+        ASSERT_LE(center.u + center.v, 1.0f) << what << ": the centre is outside its triangle";
+        // Within a cell whose sides are `size` no two places are farther apart than twice that.
+        ASSERT_LT((place(scene, hit) - place(scene, center)).norm(), 1.2f * size)
+            << what << ", size " << size << ", hit " << hit.u << ' ' << hit.v;
+    }
+}
+
+TEST(PatchGrid, HasItsCentresCloseToTheHits) {
+    for (const auto& [name, size] : {std::pair("builtin:cornell", 0.01f),
+                                     {"builtin:cornell", 0.2f},
+                                     {"builtin:cornell", 5.0f},
+                                     {"builtin:sphere:0.5", 0.01f},
+                                     {"builtin:two_rooms", 0.05f}})
+        expect_centres_close_to_their_hits(make_builtin_scene(name), size, name);
+}
+
+TEST(PatchGrid, HasItsCentresCloseToTheHitsOnSlivers) {
+    // Ten long, a tenth wide, the short edge in each of the three places.
+    const Vec3 a(0, 0, 0), b(10, 0, 0), c(10, 0.1f, 0);
+    expect_centres_close_to_their_hits(single_triangle(a, b, c), 0.2f, "abc");
+    expect_centres_close_to_their_hits(single_triangle(b, c, a), 0.2f, "bca");
+    expect_centres_close_to_their_hits(single_triangle(c, a, b), 0.2f, "cab");
+}
+
+TEST(PatchGrid, GivesEachSideOfASceneItsArea) {
+    for (const char* name : {"builtin:cornell", "builtin:two_rooms", "builtin:sphere:0.5"}) {
+        const Scene scene = make_builtin_scene(name);
+        double area = 0.0;
+        for (const Triangle& t : scene.triangles)
+            area += 0.5
+                    * (scene.positions[t[1]] - scene.positions[t[0]])
+                          .cross(scene.positions[t[2]] - scene.positions[t[0]])
+                          .cast<double>()
+                          .norm();
+        for (const float size : {0.03f, 0.11f, 10.0f}) {
+            const PatchGrid grid(scene, size);
+            double sides[2] = {};
+            for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
+                EXPECT_GE(grid.area(patch), 0.0f);
+                sides[patch % 2] += grid.area(patch);
+            }
+            EXPECT_NEAR(sides[0], area, 1e-4 * area) << name;
+            EXPECT_NEAR(sides[1], area, 1e-4 * area) << name;
+        }
+    }
+}
+
+TEST(PatchGrid, KnowsTheAreaOfEachPatch) {
+    // Places uniform on a triangle fall into patches in proportion to their areas.
+    const Scene scene = single_triangle({0, 0, 0}, {1, 0, 0}, {0.3f, 0.6f, 0});
+    const PatchGrid grid(scene, 0.21f);
+    constexpr int count = 200'000;
+    Rng rng(4, 0);
+    std::map<std::uint32_t, int> hits;
+    for (int k = 0; k < count; ++k)
+        ++hits[grid.patch_of(random_hit(0, rng))];
+    EXPECT_GT(hits.size(), 20u);
+    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
+        const double share = grid.area(patch) / (2.0 * 0.3);
+        const double error = std::sqrt(share * (1.0 - share) / count);
+        EXPECT_NEAR(hits[patch] / static_cast<double>(count), share, 4.0 * error + 1e-7)
+            << "patch " << patch;
+    }
+}
+
+} // namespace
+} // namespace afterglow

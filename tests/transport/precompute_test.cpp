@@ -1,0 +1,99 @@
+#include "core/builtin_scenes.h"
+#include "core/error.h"
+#include "core/parallel.h"
+#include "transport/precompute.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+namespace afterglow {
+namespace {
+
+PrecomputeOptions quick() {
+    PrecomputeOptions options;
+    options.coarse_radius = 0.2f;
+    options.receiver_levels = 3;
+    options.sender_levels = 2;
+    options.links.rays = 64;
+    return options;
+}
+
+bool equal(const TransferOperator& a, const TransferOperator& b) {
+    const auto same_rows = [](const auto& x, const auto& y) {
+        return std::equal(x.index.span().begin(), x.index.span().end(), y.index.span().begin(),
+                          y.index.span().end())
+               && std::equal(x.value.span().begin(), x.value.span().end(), y.value.span().begin(),
+                             y.value.span().end());
+    };
+    return a.points.level_begin == b.points.level_begin && a.points.position == b.points.position
+           && a.area == b.area && same_rows(a.push.parents, b.push.parents)
+           && same_rows(a.links, b.links);
+}
+
+TEST(Precompute, DependsOnTheSeedButNotOnThreads) {
+    const Scene scene = make_builtin_scene("builtin:cornell");
+    const Surface surface(scene);
+    const auto make = [&](int threads, std::uint64_t seed) {
+        const ThreadLimit limit(threads);
+        PrecomputeOptions options = quick();
+        options.seed = seed;
+        return precompute(surface, options);
+    };
+    const TransferOperator one = make(1, 5);
+    EXPECT_TRUE(equal(one, make(2, 5)));
+    EXPECT_FALSE(equal(one, make(2, 6)));
+}
+
+TEST(Precompute, MakesWhatItsOptionsSay) {
+    const Scene scene = make_builtin_scene("builtin:cornell");
+    const Surface surface(scene);
+    PrecomputeReport report;
+    const TransferOperator transfer = precompute(surface, quick(), &report);
+    EXPECT_EQ(transfer.points.levels(), 3);
+    EXPECT_EQ(transfer.sender_levels, 2);
+    EXPECT_EQ(transfer.points.spacing[0], 0.2f);
+    EXPECT_EQ(transfer.senders(), transfer.points.end(1));
+    EXPECT_EQ(transfer.area.size(), transfer.senders());
+    EXPECT_EQ(transfer.links.rows(), transfer.points.size());
+    EXPECT_EQ(transfer.push.parents.rows(), transfer.points.size());
+    EXPECT_GE(report.links.rays, 64u * transfer.points.size());
+    EXPECT_EQ(report.viewpoints.size(), 1u);
+    EXPECT_GT(report.total_seconds, 0.0);
+}
+
+TEST(Precompute, StaysInSightOfAGivenViewpoint) {
+    const Scene scene = make_builtin_scene("builtin:two_rooms_closed");
+    const Surface surface(scene);
+    PrecomputeOptions options = quick();
+    options.coarse_radius = 1.5f;
+    options.viewpoint = Vec3(6.0f, 1.4f, 2.0f);
+    const TransferOperator second = precompute(surface, options);
+    EXPECT_GT(second.points.position.row(0).minCoeff(), 4.025f);
+    options.viewpoint.reset();
+    const TransferOperator both = precompute(surface, options);
+    EXPECT_LT(both.points.position.row(0).minCoeff(), 1.0f);
+    EXPECT_GT(both.points.position.row(0).maxCoeff(), 7.0f);
+}
+
+TEST(Precompute, RefusesImpossibleOptions) {
+    const Scene scene = make_builtin_scene("builtin:furnace");
+    const Surface surface(scene);
+    const auto expect_refusal = [&](auto&& change) {
+        PrecomputeOptions options = quick();
+        change(options);
+        EXPECT_THROW(precompute(surface, options), UsageError);
+    };
+    expect_refusal([](auto& o) { o.receiver_levels = 0; });
+    expect_refusal([](auto& o) { o.receiver_levels = 11; });
+    expect_refusal([](auto& o) { o.sender_levels = 0; });
+    expect_refusal([](auto& o) { o.sender_levels = 4; });
+    expect_refusal([](auto& o) { o.coarse_radius = -1.0f; });
+    expect_refusal([](auto& o) { o.coarse_radius = std::numeric_limits<float>::quiet_NaN(); });
+    expect_refusal([](auto& o) { o.links.rays = 100; });
+    expect_refusal([](auto& o) { o.links.rays = 8; });
+}
+
+} // namespace
+} // namespace afterglow

@@ -1,0 +1,146 @@
+#include "core/builtin_scenes.h"
+#include "core/sampling.h"
+#include "transport/sender_rows.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace afterglow {
+namespace {
+
+struct Example {
+    Scene scene;
+    Surface surface;
+    PointHierarchy points;
+    ShepardBasis basis;
+
+    explicit Example(const std::string& name, float coarse_radius)
+        : scene(make_builtin_scene(name)), surface(scene),
+          points(make_points(surface, coarse_radius)), basis(points, surface, true) {}
+
+    static PointHierarchy make_points(const Surface& surface, float coarse_radius) {
+        CandidateSource source(surface, {*surface.scene().viewpoint}, 1);
+        HierarchyOptions options;
+        options.coarse_radius = coarse_radius;
+        options.levels = 3;
+        options.openness_density = 0.0f;
+        return build_hierarchy(source, options);
+    }
+};
+
+/// Hits all over the front sides: `count` a triangle, random.
+std::vector<Hit> hits_on_fronts(const Scene& scene, int count, std::uint64_t seed) {
+    Rng rng(seed, 0);
+    std::vector<Hit> hits;
+    for (std::uint32_t t = 0; t < scene.triangles.size(); ++t)
+        for (int k = 0; k < count; ++k) {
+            const float s = std::sqrt(rng.uniform()), r = rng.uniform();
+            Hit hit;
+            hit.distance = 1.0f;
+            hit.primitive = t;
+            hit.u = s * (1.0f - r);
+            hit.v = s * r;
+            hits.push_back(hit);
+        }
+    return hits;
+}
+
+std::vector<std::uint32_t> numbers_of(const SenderRows& rows, const std::vector<Hit>& hits) {
+    std::vector<std::uint32_t> numbers;
+    for (const Hit& hit : hits)
+        for (int level = 0; level < rows.levels(); ++level)
+            numbers.push_back(rows.number(hit, level));
+    return numbers;
+}
+
+bool equal(std::span<const BasisEntry> a, std::span<const BasisEntry> b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](auto& x, auto& y) { return x.index == y.index && x.value == y.value; });
+}
+
+TEST(SenderRows, AreTheBasisAtTheCentresOfTheirPatches) {
+    const Example example("builtin:cornell", 0.2f);
+    SenderRows rows(example.surface, example.basis, 3, 0.25f);
+    const std::vector<Hit> hits = hits_on_fronts(example.scene, 300, 2);
+    rows.require(numbers_of(rows, hits));
+    std::size_t empty = 0, from_coarser = 0;
+    for (int level = 0; level < 3; ++level) {
+        const PatchGrid grid(example.scene, 0.25f * example.points.spacing[level]);
+        for (const Hit& hit : hits) {
+            const SurfacePoint x = example.surface.point(grid.center(grid.patch_of(hit)));
+            const auto row = rows.row(rows.number(hit, level));
+            empty += row.empty();
+            float sum = 0.0f;
+            for (const BasisEntry& entry : row) {
+                EXPECT_GT(entry.value, 0.0f);
+                EXPECT_LT(entry.index, example.points.end(level));
+                sum += entry.value;
+            }
+            if (row.empty()) continue;
+            ASSERT_NEAR(sum, 1.0f, 1e-5f);
+            std::vector<BasisEntry> expected;
+            for (int l = level; l >= 0 && expected.empty(); --l) {
+                example.basis.evaluate(l, x, expected);
+                from_coarser += l < level && !expected.empty();
+            }
+            if (expected.empty()) example.basis.evaluate_or_nearest(level, x, expected);
+            EXPECT_TRUE(equal(row, expected)) << "at " << x.position.transpose();
+        }
+    }
+    EXPECT_LT(empty, 0.001 * 3 * hits.size());
+    EXPECT_LE(rows.uncovered(), empty);
+}
+
+TEST(SenderRows, AreTheSameInWhateverOrderTheyAreMade) {
+    const Example example("builtin:cornell", 0.2f);
+    SenderRows bit_by_bit(example.surface, example.basis, 3), at_once = bit_by_bit;
+    std::vector<std::uint32_t> numbers = numbers_of(at_once, hits_on_fronts(example.scene, 50, 3));
+    at_once.require(numbers);
+    // With repetitions and rays that left the scene.
+    std::vector<std::uint32_t> again(numbers.rbegin(), numbers.rend());
+    again.push_back(no_index);
+    for (std::size_t first = 0; first < again.size(); first += 100)
+        bit_by_bit.require(
+            std::span(again).subspan(first, std::min<std::size_t>(150, again.size() - first)));
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+    EXPECT_EQ(at_once.made(), numbers.size());
+    EXPECT_EQ(bit_by_bit.made(), numbers.size());
+    for (const std::uint32_t n : numbers)
+        ASSERT_TRUE(equal(at_once.row(n), bit_by_bit.row(n)));
+}
+
+TEST(SenderRows, ShareOutTheAreaOfTheScene) {
+    // Six faces of 2 x 2; so many hits that every patch is met.
+    const Example example("builtin:furnace", 0.5f);
+    SenderRows rows(example.surface, example.basis, 3);
+    rows.require(numbers_of(rows, hits_on_fronts(example.scene, 50'000, 4)));
+    const std::vector<float> areas = rows.areas();
+    ASSERT_EQ(areas.size(), example.points.size());
+    double total = 0.0;
+    const double mean = 24.0 / (example.points.end(2) - example.points.begin(2));
+    for (std::uint32_t i = example.points.begin(2); i < example.points.end(2); ++i) {
+        EXPECT_GT(areas[i], 0.0f);
+        EXPECT_LT(areas[i], 4.0 * mean);
+        total += areas[i];
+    }
+    EXPECT_NEAR(total, 24.0, 0.05);
+}
+
+TEST(SenderRows, GiveFunctionsThatNoPatchMetTheirDisk) {
+    const Example example("builtin:furnace", 0.5f);
+    const SenderRows rows(example.surface, example.basis, 2);
+    const std::vector<float> areas = rows.areas();
+    ASSERT_EQ(areas.size(), example.points.end(1));
+    for (int l = 0; l < 2; ++l)
+        for (std::uint32_t i = example.points.begin(l); i < example.points.end(l); ++i)
+            EXPECT_FLOAT_EQ(areas[i], example.points.spacing[l] * example.points.spacing[l]);
+}
+
+} // namespace
+} // namespace afterglow
