@@ -132,7 +132,16 @@ void add_run_options(CLI::App& command, RunOptions& run) {
 }
 
 void add_seed_option(CLI::App& command, RunOptions& run) {
-    command.add_option("--seed", run.seed, "Seed of all random numbers (default 1)");
+    command
+        .add_option_function<std::string>(
+            "--seed",
+            [&run](const std::string& text) {
+                if (!parse(text, run.seed))
+                    throw UsageError("--seed must be an integer from 0 to 2^64 - 1, not '" + text
+                                     + "'");
+            },
+            "Seed of all random numbers (default 1)")
+        ->type_name("UINT");
 }
 
 } // namespace afterglow

@@ -12,6 +12,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -176,8 +178,11 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     options.coarse_radius = static_cast<float>(command.coarse_radius);
     options.links.threshold = given("--epsilon") ? static_cast<float>(command.epsilon)
                                                  : threshold_for_error(command.target_error);
+    options.links.rays = std::max(16, static_cast<int>(std::bit_ceil(
+                                          static_cast<unsigned>(options.links.rays))));
     if (!given("--sender-levels"))
         options.sender_levels = std::min(options.sender_levels, options.receiver_levels);
+    check(options);
 }
 
 } // namespace
@@ -211,8 +216,9 @@ void add_precompute_command(CLI::App& app) {
     sub->add_option("--sender-levels", command->options.sender_levels,
                     "How many of them, from the coarsest on, also send light (default 4)");
     sub->add_option("--rays", command->options.links.rays,
-                    "Gather rays of each finest point, a power of two (default 512); twice as many "
-                    "a level up");
+                    "Gather rays of each finest point, made a power of two (default 512); twice as "
+                    "many a level up")
+        ->check(CLI::Range(1, 32768));
     sub->add_option("--bounces", command->bounces, "Bounces of indirect light (default 0: all)")
         ->check(CLI::Range(0, most_bounces));
     sub->add_option("--report", command->report, "JSON file for counts and times");

@@ -34,7 +34,8 @@ LinkVector to_float(const LinkValue& v) {
 /// Thresholds of one receiver level, on the size of a link.
 struct LevelThresholds {
     float kept;       // what a link must exceed to be stored
-    float negligible; // what a pushed link must exceed to be predicted for the children; 0: no children
+    bool has_children;
+    float negligible; // what a pushed link must exceed to be predicted for the children
 };
 
 /// What a thread needs to turn samples into the row of a receiver.
@@ -53,7 +54,7 @@ public:
         gather(samples);
         if (level > 0) subtract_prediction(i, points_.begin(level - 1), parents);
         threshold(level, thresholds.kept, kept, links_before);
-        if (thresholds.negligible > 0.0f) push_down(kept, thresholds.negligible, pushed);
+        if (thresholds.has_children) push_down(kept, thresholds.negligible, pushed);
         link_.clear();
         predicted_.clear();
     }
@@ -174,6 +175,12 @@ private:
 
 } // namespace
 
+GatherDirections gather_directions(const LinkOptions& options, int level, int levels) {
+    const std::int64_t rays = static_cast<std::int64_t>(options.rays) << (levels - 1 - level);
+    return {static_cast<int>(std::min<std::int64_t>(std::max(options.most_rays, options.rays), rays)),
+            hash64(options.seed, static_cast<std::uint64_t>(level))};
+}
+
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
                  SenderRows& rows, const LinkOptions& options, LinkStatistics& statistics) {
     constexpr Index samples_at_once = 1 << 20, grain = 16;
@@ -183,14 +190,13 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     std::vector<std::uint32_t> needed;
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     for (int l = 0; l < points.levels(); ++l) {
-        const GatherDirections directions(
-            std::min(std::max(options.most_rays, options.rays), options.rays << (points.levels() - 1 - l)),
-            hash64(options.seed, static_cast<std::uint64_t>(l)));
+        const GatherDirections directions = gather_directions(options, l, points.levels());
         // A pushed link an eighth of the children's threshold decides nothing there.
         const float kept = options.threshold * points.spacing.back() / points.spacing[l];
         const bool has_children = l + 1 < points.levels();
         const LevelThresholds thresholds{
-            kept, has_children ? 0.125f * kept * points.spacing[l] / points.spacing[l + 1] : 0.0f};
+            kept, has_children,
+            has_children ? 0.125f * kept * points.spacing[l] / points.spacing[l + 1] : 0.0f};
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());

@@ -38,6 +38,9 @@ struct LinkStatistics {
     std::uint64_t patches = 0, uncovered_patches = 0;
 };
 
+/// The rays of the receivers of one level, of so many.
+GatherDirections gather_directions(const LinkOptions& options, int level, int levels);
+
 /// Gathers, differences and thresholds the links of every receiver, level by level.
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
                  SenderRows& rows, const LinkOptions& options,

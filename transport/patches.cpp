@@ -35,38 +35,46 @@ PatchGrid::Location PatchGrid::locate(std::uint32_t patch) const {
             (cell - c.first) / c.along_u};
 }
 
+PatchGrid::Part PatchGrid::part(const Location& at) const {
+    // [u0, u1] x [v0, v1] below u + v = 1, where the triangle's third edge runs: the corner triangle
+    // that begins at (u0, v0), less those at (u1, v0) and (u0, v1), plus the one taken away twice.
+    const Cells& c = cells_[at.triangle];
+    Part part;
+    for (int k = 0; k < 4; ++k) {
+        const double u = static_cast<double>(at.i + (k & 1)) / c.along_u;
+        const double v = static_cast<double>(at.j + (k >> 1)) / c.along_v;
+        const double side = std::max(0.0, 1.0 - u - v);
+        const double share = (k == 0 || k == 3 ? 1.0 : -1.0) * side * side;
+        part.share += share;
+        part.u += share * (u + side / 3.0);
+        part.v += share * (v + side / 3.0);
+    }
+    if (part.share > 0.0) {
+        part.u /= part.share;
+        part.v /= part.share;
+    }
+    return part;
+}
+
 Hit PatchGrid::center(std::uint32_t patch) const {
     const Location at = locate(patch);
-    const Cells& c = cells_[at.triangle];
+    const Part part = this->part(at);
     Hit hit;
     hit.distance = 0.0f;
     hit.primitive = at.triangle;
-    hit.u = (static_cast<float>(at.i) + 0.5f) / c.along_u;
-    hit.v = (static_cast<float>(at.j) + 0.5f) / c.along_v;
-    if (c.along_u == 1 && c.along_v == 1) hit.u = hit.v = 1.0f / 3.0f;
-    // Cells on the long edge reach over it; their part of the triangle is what counts.
-    if (const float sum = hit.u + hit.v; sum > 0.999f) {
-        hit.u *= 0.999f / sum;
-        hit.v *= 0.999f / sum;
-    }
+    hit.u = std::clamp(static_cast<float>(part.u), 0.0f, 1.0f);
+    hit.v = std::clamp(static_cast<float>(part.v), 0.0f, 1.0f - hit.u);
     hit.back_side = patch & 1u;
     return hit;
 }
 
 float PatchGrid::area(std::uint32_t patch) const {
     const Location at = locate(patch);
-    const Cells& c = cells_[at.triangle];
     const Triangle& corner = scene_.triangles[at.triangle];
     const Vec3& a = scene_.positions[corner[0]];
     const float parallelogram
         = (scene_.positions[corner[1]] - a).cross(scene_.positions[corner[2]] - a).norm();
-    // The part of [0, du] x [0, dv] below the line x + y = rest, where the long edge runs.
-    const float du = 1.0f / c.along_u, dv = 1.0f / c.along_v;
-    const float rest = 1.0f - at.i * du - at.j * dv;
-    const auto half_square = [](float x) { return x > 0.0f ? 0.5f * x * x : 0.0f; };
-    const float inside = half_square(rest) - half_square(rest - du) - half_square(rest - dv)
-                         + half_square(rest - du - dv);
-    return parallelogram * std::max(0.0f, inside);
+    return 0.5f * parallelogram * static_cast<float>(std::max(0.0, part(at).share));
 }
 
 } // namespace afterglow

@@ -26,7 +26,7 @@ public:
         const auto j = std::min<std::uint32_t>(c.along_v - 1u, static_cast<std::uint32_t>(hit.v * c.along_v));
         return 2 * (c.first + j * c.along_u + i) + static_cast<std::uint32_t>(hit.back_side);
     }
-    /// The place that stands for a patch, as a hit on it.
+    /// The place that stands for a patch, the centroid of its part of the triangle, as a hit on it.
     Hit center(std::uint32_t patch) const;
     /// Area of the patch's part of its triangle [world^2].
     float area(std::uint32_t patch) const;
@@ -41,6 +41,11 @@ private:
         std::uint32_t triangle, i, j;
     };
     Location locate(std::uint32_t patch) const;
+    /// A cell's part of its triangle: the share of the triangle's area, the centroid's weights.
+    struct Part {
+        double share = 0.0, u = 0.0, v = 0.0;
+    };
+    Part part(const Location& at) const;
 
     const Scene& scene_;
     std::vector<Cells> cells_; // a triangle each

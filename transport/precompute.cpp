@@ -18,6 +18,8 @@ double seconds_since(Clock::time_point start) {
 /// The finest sender spacing as a share of the typical ray length; the coarsest level follows.
 constexpr float finest_sender_share = 0.04f;
 
+} // namespace
+
 void check(const PrecomputeOptions& options) {
     if (options.receiver_levels < 1 || options.receiver_levels > 10)
         throw UsageError("--receiver-levels must lie between 1 and 10");
@@ -30,8 +32,6 @@ void check(const PrecomputeOptions& options) {
     if (rays < 16 || rays > 32768 || !std::has_single_bit(static_cast<unsigned>(rays)))
         throw UsageError("--rays must be a power of two between 16 and 32768");
 }
-
-} // namespace
 
 TransferOperator precompute(const Surface& surface, const PrecomputeOptions& options,
                             PrecomputeReport* report) {

@@ -35,7 +35,10 @@ struct PrecomputeReport {
     double total_seconds = 0.0;
 };
 
-/// From a scene to its transfer operator. Throws UsageError for impossible options.
+/// Throws UsageError for options that cannot be.
+void check(const PrecomputeOptions& options);
+
+/// From a scene to its transfer operator. Throws as check() does.
 TransferOperator precompute(const Surface& surface, const PrecomputeOptions& options,
                             PrecomputeReport* report = nullptr);
 

@@ -61,25 +61,11 @@ std::string opened_scene_path(const std::string& file, const std::string& stored
 
 // What the computation needs to know beside the arrays
 
-/// A float as the number that its shortest decimal form names: 0.1, not 0.10000000149011612. Gives
-/// the same float back.
-double decimal(float value) {
-    char text[32];
-    const auto end = std::to_chars(text, text + sizeof text, value).ptr;
-    double number = 0.0;
-    std::from_chars(text, end, number);
-    return number;
-}
-
 std::string model_text(const TransferOperator& transfer) {
-    const BasisShape& shape = transfer.points.shape;
     return Json{{"operator", operator_name},
                 {"sender_levels", transfer.sender_levels},
                 {"bounces", transfer.bounces},
-                {"weight_power", shape.weight_power},
-                {"placement_power", shape.placement_power},
-                {"reach_coarsest", decimal(shape.reach_coarsest)},
-                {"reach_finest", decimal(shape.reach_finest)}}
+                {"weight_power", transfer.points.shape.weight_power}}
         .dump();
 }
 
@@ -162,13 +148,9 @@ private:
         const Json model = parse("model");
         if (model.value("operator", Json()) != operator_name)
             fail("holds an operator that this program does not know");
-        BasisShape& shape = transfer.points.shape;
         transfer.sender_levels = integer(model, "sender_levels", 1, transfer.points.levels());
         transfer.bounces = integer(model, "bounces", 0, most_bounces);
-        shape.weight_power = integer(model, "weight_power", 1, 1000);
-        shape.placement_power = integer(model, "placement_power", 1, 1000);
-        shape.reach_coarsest = reach(model, "reach_coarsest");
-        shape.reach_finest = reach(model, "reach_finest");
+        transfer.points.shape.weight_power = integer(model, "weight_power", 1, 1000);
         if (transfer.senders() == 0) fail("has no senders");
     }
 
@@ -184,13 +166,6 @@ private:
             fail(std::string("needs ") + key + " between " + std::to_string(least) + " and "
                  + std::to_string(most));
         return value->get<int>();
-    }
-
-    float reach(const Json& model, const char* key) const {
-        const auto value = model.find(key);
-        if (value == model.end() || !value->is_number() || !(*value > 0.0) || !(*value < 1000.0))
-            fail(std::string("needs a positive ") + key);
-        return value->get<float>();
     }
 
     /// Offsets of `rows` rows over `entries` entries: from 0, never falling.

@@ -1,17 +1,31 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "core/sampling.h"
 #include "tests/bench/accuracy_points.h"
+#include "transport/display.h"
+#include "transport/measures.h"
+#include "transport/precompute.h"
+#include "transport/provenance.h"
+#include "transport/transfer_file.h"
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <span>
 
 // Accuracy over a set of scenes, run by hand; `references` traces what the others compare with.
 
 namespace afterglow {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 struct Common {
     std::string scenes, lights, strategy = "plain";
@@ -72,6 +86,166 @@ void run_references(const Common& common) {
     }
 }
 
+
+struct MeasureOptions {
+    PrecomputeOptions precompute;
+    std::string json;
+    bool time_rays = false;
+};
+
+void add_measure_options(CLI::App& command, MeasureOptions& options) {
+    PrecomputeOptions& p = options.precompute;
+    command.add_option("--rays", p.links.rays);
+    command.add_option("--most-rays", p.links.most_rays);
+    command.add_option("--epsilon", p.links.threshold);
+    command.add_option("--footprint-angle", p.links.footprint_angle);
+    command.add_option("--coarse-radius", p.coarse_radius);
+    command.add_option("--receiver-levels", p.receiver_levels);
+    command.add_option("--sender-levels", p.sender_levels);
+    command.add_option("--openness-density", p.openness_density);
+    command.add_option("--seed", p.seed);
+    command.add_flag("--time-rays", options.time_rays,
+                     "Trace the gather rays once more, with nothing else, for the ray ratio");
+    command.add_option("--json", options.json, "File for all figures");
+}
+
+/// Indirect irradiance at the reference's points; column 3 * point + light.
+Eigen::Array3Xf displayed_irradiance(const Surface& surface, const TransferOperator& transfer,
+                                     const AccuracyScene& scene,
+                                     const std::vector<SurfacePoint>& points, Index& uncovered) {
+    const LightTransport transport(transfer);
+    const Display display(transfer, surface);
+    const auto count = static_cast<Index>(points.size());
+    Eigen::Array3Xf irradiance(3, 3 * count);
+    std::vector<std::uint8_t> is_covered(points.size(), 0);
+    for (Index l = 0; l < 3; ++l) {
+        const VectorIrradiance field =
+            transport.indirect(surface, scene.lights[static_cast<std::size_t>(l)]);
+        parallel_for(count, [&](Index p) {
+            bool covered = false;
+            irradiance.col(3 * p + l) =
+                display.irradiance(points[static_cast<std::size_t>(p)], field, covered);
+            is_covered[static_cast<std::size_t>(p)] = covered;
+        });
+    }
+    uncovered = std::count(is_covered.begin(), is_covered.end(), 0);
+    return irradiance;
+}
+
+/// Seconds to trace the rays of all links once more with nothing else around.
+double gather_rays_alone(const Surface& surface, const PointHierarchy& points,
+                         const LinkOptions& options) {
+    double seconds = 0.0;
+    for (int l = 0; l < points.levels(); ++l) {
+        const GatherDirections directions = gather_directions(options, l, points.levels());
+        const int rays = directions.rays();
+        constexpr Index at_once = 256; // points whose rays are made before the clock runs
+        std::vector<Ray> ray(static_cast<std::size_t>(at_once) * rays);
+        std::vector<Hit> hit(ray.size());
+        for (Index begin = points.begin(l); begin < points.end(l); begin += at_once) {
+            const Index count = std::min<Index>(at_once, points.end(l) - begin);
+            parallel_ranges(count, 16, [&](Index first, Index last) {
+                Eigen::Matrix3Xf local;
+                for (Index r = first; r < last; ++r) {
+                    const SurfacePoint x = points.point(begin + r);
+                    const Frame frame(x.normal);
+                    directions.deal(begin + r - points.begin(l), local);
+                    for (int k = 0; k < rays; ++k)
+                        ray[static_cast<std::size_t>(r) * rays + k] = {
+                            surface.lifted(x), frame.to_world(local.col(k))};
+                }
+            });
+            const auto start = std::chrono::steady_clock::now();
+            parallel_ranges(count, 16, [&](Index first, Index last) {
+                const auto from = static_cast<std::size_t>(first) * rays;
+                const auto number = static_cast<std::size_t>(last - first) * rays;
+                surface.closest_hits(std::span(ray).subspan(from, number),
+                                     std::span(hit).subspan(from, number));
+            });
+            seconds +=
+                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        }
+    }
+    return seconds;
+}
+
+void run_measure(const Common& common, const MeasureOptions& options) {
+    const ThreadLimit limit(common.threads);
+    std::printf("%-18s %5s %6s %6s %6s %6s %6s %6s %6s  errors in %% of light 1, 2, 3; "
+                "reference's own error subtracted in 'net'\n",
+                "scene", "light", "rmse", "net", "l1", "bias", "median", "p95", "p99");
+    Json all = Json::array();
+    for (const std::string& name : common.names) {
+        const AccuracyScene described = find_accuracy_scene(name, common.scenes, common.lights);
+        const Scene scene = load_scene(described.path);
+        const Surface surface(scene);
+        ReferenceOptions reference_options = common.reference;
+        reference_options.tracer.strategy = strategy_from_name(common.strategy);
+        const AccuracyReference reference =
+            accuracy_reference(surface, described, reference_options);
+
+        PrecomputeReport report;
+        const TransferOperator transfer = precompute(surface, options.precompute, &report);
+        Index uncovered = 0;
+        const Eigen::Array3Xf x =
+            displayed_irradiance(surface, transfer, described, reference.points, uncovered);
+        const auto of_light = [](const Eigen::Array3Xf& columns, Index light) {
+            Eigen::Array3Xf picked(3, columns.cols() / 3);
+            for (Index p = 0; p < picked.cols(); ++p)
+                picked.col(p) = columns.col(3 * p + light);
+            return picked;
+        };
+        Json lights = Json::array();
+        for (Index l = 0; l < 3; ++l) {
+            const Measures m = measure(of_light(x, l), of_light(reference.irradiance.indirect, l));
+            const double own = reference.irradiance.relative_error[static_cast<std::size_t>(l)];
+            const double net = std::sqrt(std::max(0.0, m.rel_rmse * m.rel_rmse - own * own));
+            std::printf("%-18s %5lld %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f\n", name.c_str(),
+                        static_cast<long long>(l + 1), 100 * m.rel_rmse, 100 * net,
+                        100 * m.rel_l1, 100 * m.bias, 100 * m.median, 100 * m.p95, 100 * m.p99);
+            lights.push_back({{"rel_rmse", m.rel_rmse},
+                              {"rel_rmse_net", net},
+                              {"rel_l1", m.rel_l1},
+                              {"bias", m.bias},
+                              {"median", m.median},
+                              {"p95", m.p95},
+                              {"p99", m.p99},
+                              {"reference_error", own}});
+        }
+        std::string file = name;
+        std::replace(file.begin(), file.end(), ':', '_');
+        file = (std::filesystem::path(common.reference.cache) / (file + ".safetensors")).string();
+        save_transfer(file, transfer, {.version = AFTERGLOW_VERSION, .scene = described.path,
+                                       .scene_hash = scene.content_hash()});
+        const std::uint64_t bytes = std::filesystem::file_size(file);
+        std::printf("%s: %zu points, %lld uncovered, %.1f s (points %.1f push %.1f gather %.1f rows "
+                    "%.1f links %.1f), %.0fM rays, %u receivers, %u senders, %.2fM links, %.1f MB\n",
+                    name.c_str(), reference.points.size(), static_cast<long long>(uncovered),
+                    report.total_seconds, report.points_seconds, report.push_seconds,
+                    report.links.trace_seconds, report.links.rows_seconds,
+                    report.links.links_seconds, 1e-6 * static_cast<double>(report.links.rays),
+                    transfer.points.size(), transfer.senders(),
+                    1e-6 * static_cast<double>(transfer.links.entries()),
+                    1e-6 * static_cast<double>(bytes));
+        Json entry = {{"scene", name},
+                      {"points", reference.points.size()},
+                      {"uncovered", uncovered},
+                      {"lights", lights},
+                      {"seconds", report.total_seconds},
+                      {"bytes", bytes}};
+        if (options.time_rays) {
+            const double alone = gather_rays_alone(surface, transfer.points, options.precompute.links);
+            std::printf("%s: the same gather rays alone %.1f s, ray ratio %.2f\n", name.c_str(),
+                        alone, report.total_seconds / alone);
+            entry["rays_alone_seconds"] = alone;
+            entry["ray_ratio"] = report.total_seconds / alone;
+        }
+        all.push_back(entry);
+        std::fflush(stdout);
+    }
+    if (!options.json.empty()) write_text(options.json, all.dump(1) + "\n");
+}
+
 } // namespace
 } // namespace afterglow
 
@@ -83,6 +257,12 @@ int main(int argc, char** argv) {
         app.add_subcommand("references", "Traces the references and caches them");
     afterglow::add_common_options(*references, common);
     references->callback([&] { afterglow::run_references(common); });
+    afterglow::MeasureOptions measure_options;
+    CLI::App* measure = app.add_subcommand(
+        "measure", "Precomputes each scene and compares with its reference, under three lights");
+    afterglow::add_common_options(*measure, common);
+    afterglow::add_measure_options(*measure, measure_options);
+    measure->callback([&] { afterglow::run_measure(common, measure_options); });
     try {
         app.parse(argc, argv);
         return 0;

@@ -1,52 +1,14 @@
 #include "core/image.h"
+#include "tests/support/program.h"
 #include "tests/support/temporary_folder.h"
 #include "transport/csv_points.h"
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <string>
-#include <sys/wait.h>
-
-// Runs the program itself, whose path is AFTERGLOW_PROGRAM.
 
 namespace afterglow {
 namespace {
-
-struct Outcome {
-    int status = -1;
-    std::string out, err;
-};
-
-std::string content(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-
-Outcome run(const std::string& arguments) {
-    const TemporaryFolder streams;
-    const std::string command = std::string("'") + AFTERGLOW_PROGRAM + "' " + arguments + " >'"
-                                + streams.path("out") + "' 2>'" + streams.path("err")
-                                + "' </dev/null";
-    const int status = std::system(command.c_str());
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content(streams.path("out")),
-            content(streams.path("err"))};
-}
-
-const std::string light = " --light-position 0.278,0.54,0.28 --light-direction 0,-1,0"
-                          " --light-cone 40,45 --light-intensity 1,1,1";
-const std::string camera = " --camera-position 0.278,0.273,-0.8 --camera-target 0.278,0.273,0"
-                           " --camera-fov 38 --size 16x12";
-
-/// An error is one line that says who speaks.
-void expect_failure(const Outcome& run, int status) {
-    EXPECT_EQ(run.status, status) << run.err;
-    EXPECT_EQ(run.out, "");
-    EXPECT_TRUE(run.err.starts_with("afterglow: ")) << run.err;
-    EXPECT_EQ(run.err.find('\n'), run.err.size() - 1) << run.err;
-}
 
 TEST(CommandLine, ToldToHelpItDoes) {
     for (const char* arguments : {"--help", "reference --help", "compare --help", "--version"}) {
@@ -136,7 +98,7 @@ TEST(CommandLine, ReferencePictureCarriesItsProvenanceAndEqualsItself) {
     for (const char* name : {"afterglow.version", "afterglow.seed", "afterglow.scene_hash",
                              "afterglow.relative_standard_error"})
         EXPECT_TRUE(image.attributes.contains(name)) << name;
-    EXPECT_NE(content(folder.path("r.json")).find("\"relative_standard_error\""),
+    EXPECT_NE(content_of(folder.path("r.json")).find("\"relative_standard_error\""),
               std::string::npos);
 
     const Outcome same = run("compare --json '" + path + "' '" + path + "'");
@@ -156,7 +118,7 @@ TEST(CommandLine, ReferencePointsAreTheSameOnAnyNumberOfThreads) {
                                  + path + "'" + light + options);
         EXPECT_EQ(made.status, 0) << made.err;
         EXPECT_EQ(made.err, "");
-        return content(path);
+        return content_of(path);
     };
     const std::string one = irradiance(" --spp 64 --threads 1");
     EXPECT_EQ(one, irradiance(" --spp 64 --threads 2"));

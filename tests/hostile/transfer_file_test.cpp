@@ -1,0 +1,292 @@
+#include "core/error.h"
+#include "tests/support/small_transfer.h"
+#include "tests/support/temporary_folder.h"
+#include "transport/safetensors.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+#include <map>
+
+namespace afterglow {
+namespace {
+
+/// "accepted", or what the one line of the FileError says.
+std::string load(const std::string& path) {
+    try {
+        load_transfer(path);
+    } catch (const FileError& error) {
+        const std::string message = error.what();
+        EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+        EXPECT_LT(message.size(), 400u);
+        return message;
+    }
+    return "accepted";
+}
+
+const std::string& small_file() {
+    static const std::string bytes = [] {
+        const TemporaryFolder folder;
+        save_transfer(folder.path("t"), small_transfer().transfer, small_transfer().provenance);
+        return content_of(folder.path("t"));
+    }();
+    return bytes;
+}
+
+TEST(HostileTransferFile, ATruncatedFileIsAnError) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("t", small_file());
+    ASSERT_EQ(load(path), "accepted");
+    for (std::size_t length = small_file().size() - 1; length > 0;
+         length -= length > 400 ? std::min<std::size_t>(length - 400, 997) : 1) {
+        std::filesystem::resize_file(path, length);
+        ASSERT_NE(load(path), "accepted") << length << " bytes";
+    }
+}
+
+TEST(HostileTransferFile, AFlippedBitIsAnError) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("t", small_file());
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    const auto put = [&](std::size_t place, char byte) {
+        file.seekp(static_cast<std::streamoff>(place));
+        file.put(byte).flush();
+    };
+    const std::size_t step = small_file().size() / 1500;
+    for (std::size_t place = 0; place < small_file().size(); place += place < 2000 ? 3 : step) {
+        const char byte = small_file()[place];
+        put(place, static_cast<char>(byte ^ (1 << place % 8)));
+        ASSERT_NE(load(path), "accepted") << "byte " << place;
+        put(place, byte);
+    }
+    EXPECT_EQ(load(path), "accepted");
+}
+
+/// The small file taken apart, to be put together again with one thing wrong and right checksums.
+struct Parts {
+    std::map<std::string, std::vector<std::byte>> bytes;
+    std::vector<Tensor> tensors;
+    TensorMetadata metadata;
+
+    explicit Parts(const SafetensorsFile& file)
+        : tensors(file.tensors()), metadata(file.metadata()) {
+        for (const Tensor& t : tensors)
+            bytes[t.name] = {t.bytes.begin(), t.bytes.end()};
+    }
+    Tensor& tensor(const std::string& name) {
+        return *std::find_if(tensors.begin(), tensors.end(),
+                             [&](const Tensor& t) { return t.name == name; });
+    }
+    template <class T>
+    std::span<T> values(const std::string& name) {
+        return {reinterpret_cast<T*>(bytes.at(name).data()), bytes.at(name).size() / sizeof(T)};
+    }
+    /// Keeps the first `count` of the tensor's slowest extent.
+    void shorten(const std::string& name, std::uint64_t count) {
+        Tensor& t = tensor(name);
+        bytes[name].resize(bytes[name].size() / t.shape[0] * count);
+        t.shape[0] = count;
+    }
+    /// Replaces a piece of the model's JSON.
+    void change_model(const std::string& from, const std::string& to) {
+        std::string& model = metadata["model"];
+        ASSERT_NE(model.find(from), std::string::npos) << model;
+        model.replace(model.find(from), from.size(), to);
+    }
+    void write(const std::string& path) {
+        for (Tensor& t : tensors)
+            t.bytes = bytes.at(t.name);
+        write_safetensors(path, tensors, metadata);
+    }
+};
+
+using Damage = std::function<void(Parts&)>;
+
+void expect_refusal(const std::map<std::string, Damage>& damages) {
+    const TemporaryFolder folder;
+    const SafetensorsFile good(folder.write("good", small_file()));
+    Parts untouched(good);
+    untouched.write(folder.path("t"));
+    ASSERT_EQ(load(folder.path("t")), "accepted");
+    for (const auto& [what, damage] : damages) {
+        Parts parts(good);
+        damage(parts);
+        parts.write(folder.path("t"));
+        EXPECT_NE(load(folder.path("t")), "accepted") << what;
+    }
+}
+
+template <class T>
+Damage set(const std::string& name, std::size_t place, T value) {
+    return [=](Parts& parts) { parts.values<T>(name)[place] = value; };
+}
+
+/// The first row of at least two entries at or after `row`.
+std::uint64_t long_row(Parts& parts, const std::string& begin, std::uint64_t row = 0) {
+    const auto offsets = parts.values<std::uint64_t>(begin);
+    while (offsets[row + 1] < offsets[row] + 2)
+        ++row;
+    return offsets[row];
+}
+
+TEST(HostileTransferFile, NumbersThatCannotBeAreRefusedThoughTheChecksumsAreRight) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const float infinite = std::numeric_limits<float>::infinity();
+    const std::uint16_t half_nan = 0x7e00, half_infinite = 0xfc00;
+    expect_refusal({
+        {"position NaN", set("points.position", 4, nan)},
+        {"position infinite", set("points.position", 0, infinite)},
+        {"normal NaN", set("points.normal", 0, nan)},
+        {"normal too long", set("points.normal", 1, 2.0f)},
+        {"support zero", set("points.support", 3, 0.0f)},
+        {"support negative", set("points.support", 3, -1.0f)},
+        {"support NaN", set("points.support", 3, nan)},
+        {"reflectance one", set("points.reflectance", 5, 1.0f)},
+        {"reflectance negative", set("points.reflectance", 5, -0.1f)},
+        {"reflectance NaN", set("points.reflectance", 5, nan)},
+        {"spacing zero", set("spacing", 1, 0.0f)},
+        {"spacing infinite", set("spacing", 1, infinite)},
+        {"area zero", set("senders.area", 0, 0.0f)},
+        {"area NaN", set("senders.area", 0, nan)},
+        {"push NaN", set("push.value", 0, nan)},
+        {"push negative", set("push.value", 0, -0.5f)},
+        {"push huge", set("push.value", 0, 1e30f)},
+        {"link NaN", set("links.value", 7, half_nan)},
+        {"link infinite", set("links.value", 0, half_infinite)},
+    });
+}
+
+TEST(HostileTransferFile, RowsThatAreNotRowsAreRefused) {
+    const auto far = std::uint64_t(1) << 60;
+    const std::uint32_t senders = small_transfer().transfer.senders();
+    const std::uint32_t points = small_transfer().transfer.points.size();
+    expect_refusal({
+        {"links begin late", set("links.begin", 0, std::uint64_t(1))},
+        {"links end elsewhere", set("links.begin", points, std::uint64_t(3))},
+        {"links offset far", set("links.begin", 5, far)},
+        {"links offset falls", set("links.begin", 5, std::uint64_t(0))},
+        {"links row unsorted",
+         [](Parts& p) {
+             const auto at = long_row(p, "links.begin");
+             const auto sender = p.values<std::uint16_t>("links.sender");
+             std::swap(sender[at], sender[at + 1]);
+         }},
+        {"links row repeats",
+         [](Parts& p) {
+             const auto at = long_row(p, "links.begin");
+             const auto sender = p.values<std::uint16_t>("links.sender");
+             sender[at + 1] = sender[at];
+         }},
+        {"links sender out of range",
+         [=](Parts& p) {
+             p.values<std::uint16_t>("links.sender").back() = static_cast<std::uint16_t>(senders);
+         }},
+        {"push offset falls", set("push.begin", points - 1, std::uint64_t(0))},
+        {"push of the coarsest", [](Parts& p) { p.values<std::uint64_t>("push.begin")[1] = 1; }},
+        {"push row unsorted",
+         [](Parts& p) {
+             const auto at = long_row(p, "push.begin");
+             const auto index = p.values<std::uint32_t>("push.index");
+             std::swap(index[at], index[at + 1]);
+         }},
+        {"push out of range", [](Parts& p) { p.values<std::uint32_t>("push.index").back() = ~0u; }},
+        {"push from its own level",
+         [=](Parts& p) { p.values<std::uint32_t>("push.index").back() = points - 1; }},
+        {"push past a level", [](Parts& p) { p.values<std::uint32_t>("push.index").back() = 0; }},
+    });
+}
+
+TEST(HostileTransferFile, SizesThatDoNotAgreeAreRefused) {
+    const auto levels = [](std::vector<std::uint32_t> begin) {
+        return [=](Parts& p) {
+            const auto values = p.values<std::uint32_t>("level_begin");
+            std::copy(begin.begin(), begin.end(), values.begin());
+        };
+    };
+    const auto& good = small_transfer().transfer.points.level_begin;
+    std::map<std::string, Damage> damages = {
+        {"levels from one", levels({1, good[1], good[2], good[3]})},
+        {"levels fall", levels({0, good[2], good[1], good[3]})},
+        {"levels beyond the points", levels({0, good[1], good[2], good[3] + 1})},
+        {"levels to the end of numbers", levels({0, good[1], good[2], ~0u})},
+        {"no points", levels({0, 0, 0, 0})},
+        {"level shifted", levels({0, good[1] + 1, good[2], good[3]})},
+        {"no levels",
+         [](Parts& p) {
+             p.shorten("level_begin", 1);
+             p.shorten("spacing", 0);
+         }},
+        {"nothing in level_begin", [](Parts& p) { p.shorten("level_begin", 0); }},
+        {"value of two",
+         [](Parts& p) {
+             p.tensor("links.value").shape = {p.bytes["links.value"].size() / 4, 2};
+         }},
+        {"position flat",
+         [](Parts& p) {
+             p.tensor("points.position").shape = {p.bytes["points.position"].size() / 4};
+         }},
+        {"other type", [](Parts& p) { p.tensor("points.support").dtype = DType::u32; }},
+        {"wide senders",
+         [](Parts& p) {
+             p.bytes["links.sender"].resize(2 * p.bytes["links.sender"].size());
+             p.tensor("links.sender").dtype = DType::u32;
+         }},
+    };
+    for (const char* name :
+         {"points.position", "points.normal", "points.support", "points.reflectance", "level_begin",
+          "spacing", "push.begin", "push.index", "push.value", "senders.area", "links.begin",
+          "links.sender", "links.value"}) {
+        damages[std::string(name) + " is short"] = [=](Parts& p) {
+            p.shorten(name, p.tensor(name).shape[0] - 1);
+        };
+        damages[std::string(name) + " is missing"] = [=](Parts& p) {
+            p.tensors.erase(p.tensors.begin() + (&p.tensor(name) - p.tensors.data()));
+        };
+    }
+    expect_refusal(damages);
+}
+
+TEST(HostileTransferFile, MetadataThatMakesNoSenseIsRefused) {
+    const auto metadata = [](const std::string& key, const std::string& value) {
+        return [=](Parts& p) { p.metadata[key] = value; };
+    };
+    const auto model = [](const std::string& from, const std::string& to) {
+        return [=](Parts& p) { p.change_model(from, to); };
+    };
+    std::map<std::string, Damage> damages = {
+        {"another format", metadata("format", "something else")},
+        {"another version", metadata("format_version", "2")},
+        {"seed of letters", metadata("seed", "one")},
+        {"seed and more", metadata("seed", "1 ")},
+        {"no path", metadata("scene", "")},
+        {"path of two lines", metadata("scene", "a\nb.obj")},
+        {"path without end", metadata("scene", std::string(10000, 'a'))},
+        {"hash of two lines", metadata("scene_hash", "a\nb")},
+        {"options broken", metadata("options", "{")},
+        {"options a list", metadata("options", "[]")},
+        {"statistics broken", metadata("statistics", "nonsense")},
+        {"statistics nested", metadata("statistics", std::string(100000, '['))},
+        {"model broken", metadata("model", "{\"sender_levels\":")},
+        {"model empty", metadata("model", "{}")},
+        {"another operator", model("neumann", "oracle")},
+        {"operator a number", model("\"neumann\"", "3")},
+        {"no sender level", model("\"sender_levels\":2", "\"sender_levels\":0")},
+        {"too many sender levels", model("\"sender_levels\":2", "\"sender_levels\":4")},
+        {"other sender levels", model("\"sender_levels\":2", "\"sender_levels\":3")},
+        {"half a sender level", model("\"sender_levels\":2", "\"sender_levels\":1.5")},
+        {"huge sender level",
+         model("\"sender_levels\":2", "\"sender_levels\":18446744073709551615")},
+        {"bounces negative", model("\"bounces\":0", "\"bounces\":-1")},
+        {"bounces endless", model("\"bounces\":0", "\"bounces\":2000000000")},
+        {"weight power negative", model("\"weight_power\":", "\"weight_power\":-")},
+        {"weight power beyond numbers", model("\"weight_power\":", "\"weight_power\":1e999")},
+    };
+    for (const char* key : {"format", "format_version", "version", "scene", "scene_hash", "seed",
+                            "model", "options", "statistics"})
+        damages[std::string("no ") + key] = [=](Parts& p) { p.metadata.erase(key); };
+    expect_refusal(damages);
+}
+
+} // namespace
+} // namespace afterglow

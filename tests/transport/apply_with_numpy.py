@@ -1,0 +1,55 @@
+"""The product of docs/transfer-format.md: from the senders' radiosity to vector irradiance.
+
+    apply_with_numpy.py FILE RADIOSITY FIELD      both raw float32, [senders, 3] and [N, 3, 3]
+"""
+import json
+import sys
+
+import numpy as np
+
+from open_with_numpy import read_safetensors
+
+
+def row_numbers(begin):
+    """The row of each entry."""
+    return np.repeat(np.arange(len(begin) - 1), np.diff(begin.astype(int)))
+
+
+def sums(row, terms, rows):
+    """Adds the terms that belong to each row of a matrix; a line of `terms` is an entry's."""
+    return np.stack([np.bincount(row, column, rows) for column in terms.T], axis=1)
+
+
+def apply_transfer(tensors, metadata, radiosity):
+    level, sender_levels = tensors["level_begin"], json.loads(metadata["model"])["sender_levels"]
+    senders, points = level[sender_levels], level[-1]
+    parent, weight = tensors["push.index"], tensors["push.value"][:, None]
+    child = row_numbers(tensors["push.begin"])
+    entries = [slice(tensors["push.begin"][level[l]], tensors["push.begin"][level[l + 1]])
+               for l in range(len(level) - 1)]  # of the points of each level
+
+    # Pull: a coarser point's value becomes the mean of those it predicts.
+    value, area = radiosity.astype(float), tensors["senders.area"][:, None].astype(float)
+    for e in reversed(entries[1:sender_levels]):
+        share = area[child[e]] * weight[e]
+        total = sums(parent[e], share, senders)
+        mean = sums(parent[e], share * value[child[e]], senders) / np.where(total > 0, total, 1)
+        value, area = np.where(total > 0, mean, value), np.where(total > 0, total, area)
+
+    # Coefficients: what the next coarser level does not predict.
+    e = slice(0, tensors["push.begin"][senders])
+    coefficient = value - sums(child[e], weight[e] * value[parent[e]], senders)
+
+    # T e, then push: each level adds what the next coarser one predicts.
+    link, sender = tensors["links.value"].astype(np.float32), tensors["links.sender"]
+    receiver = row_numbers(tensors["links.begin"])
+    field = np.concatenate([sums(receiver, link[:, axis, None] * coefficient[sender], points)
+                            for axis in range(3)], axis=1)
+    for e in entries[1:]:
+        field += sums(child[e], weight[e] * field[parent[e]], points)
+    return field.reshape(points, 3, 3)
+
+
+if __name__ == "__main__":
+    light = np.fromfile(sys.argv[2], "<f4").reshape(-1, 3)
+    apply_transfer(*read_safetensors(sys.argv[1]), light).astype("<f4").tofile(sys.argv[3])

@@ -1,0 +1,260 @@
+#include "core/image.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+#include "transport/csv_points.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+// precompute, and the commands that use what it made.
+
+namespace afterglow {
+namespace {
+
+const std::string small_settings =
+    " --coarse-radius 0.4 --receiver-levels 3 --sender-levels 2 --rays 64";
+
+std::string quoted(const std::string& path) {
+    return " '" + path + "'";
+}
+
+/// A small file of the Cornell box, made once.
+class CommandTransfer : public ::testing::Test {
+protected:
+    static void SetUpTestSuite() {
+        made_ = new TemporaryFolder;
+        ASSERT_EQ(
+            run("precompute builtin:cornell --quiet -o" + quoted(file()) + small_settings).status,
+            0);
+    }
+    static void TearDownTestSuite() { delete made_; }
+    static std::string file() { return made_->path("t"); }
+
+    TemporaryFolder folder;
+
+private:
+    static inline TemporaryFolder* made_ = nullptr;
+};
+
+TEST_F(CommandTransfer, PrecomputeTellsOnStderrAndReportsAsJson) {
+    const Outcome made = run("precompute builtin:cornell -o" + quoted(folder.path("t"))
+                             + " --report" + quoted(folder.path("r.json")) + small_settings);
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_EQ(made.out, "");
+    EXPECT_NE(made.err.find("30 triangles"), std::string::npos) << made.err;
+    EXPECT_EQ(made.err.find('\r'), std::string::npos) << "progress is for terminals";
+    const std::string report = content_of(folder.path("r.json"));
+    for (const char* key : {"\"seconds\"", "\"gather\"", "\"write\"", "\"largest_gap\"",
+                            "\"scene_hash\"", "\"options\"", "\"bytes\""})
+        EXPECT_NE(report.find(key), std::string::npos) << key;
+    EXPECT_EQ(content_of(folder.path("t")), content_of(file())) << "the same bytes again";
+    EXPECT_EQ(folder.count(), 2u);
+}
+
+TEST_F(CommandTransfer, PrecomputeGivesTheSameBytesOnAnyNumberOfThreads) {
+    for (const char* threads : {"1", "2"}) {
+        const std::string path = folder.path(threads);
+        const Outcome made = run("precompute builtin:cornell --quiet --threads "
+                                 + std::string(threads) + " -o" + quoted(path) + small_settings);
+        EXPECT_EQ(made.err, "");
+        EXPECT_EQ(content_of(path), content_of(file())) << threads << " threads";
+    }
+    const std::string seeded = folder.path("seeded");
+    run("precompute builtin:cornell --seed 2 -o" + quoted(seeded) + small_settings);
+    EXPECT_NE(content_of(seeded), content_of(file()));
+}
+
+TEST_F(CommandTransfer, WhatPrecomputeCannotDoIsStatusTwoAndLeavesNothing) {
+    const std::string start = "precompute builtin:cornell -o" + quoted(folder.path("t"));
+    for (const char* options : {"--operator oracle",
+                                "--target-error 0",
+                                "--target-error -1",
+                                "--target-error x",
+                                "--epsilon -1",
+                                "--epsilon 0.1 --target-error 0.1",
+                                "--viewpoint 0,0",
+                                "--viewpoint 0,0,nan",
+                                "--coarse-radius 0",
+                                "--coarse-radius -1",
+                                "--coarse-radius inf",
+                                "--receiver-levels 0",
+                                "--receiver-levels 99",
+                                "--sender-levels 0",
+                                "--receiver-levels 2 --sender-levels 3",
+                                "--rays 0",
+                                "--rays 100000",
+                                "--rays many",
+                                "--bounces -1",
+                                "--bounces 1e9",
+                                "--seed -1",
+                                "--threads -1",
+                                "--spp 4",
+                                "extra"}) {
+        SCOPED_TRACE(options);
+        expect_failure(run(start + " " + options), 2);
+    }
+    expect_failure(run("precompute builtin:nowhere -o" + quoted(folder.path("t"))), 2);
+    expect_failure(run("precompute builtin:cornell"), 2);
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST_F(CommandTransfer, WhereNothingCanBeWrittenNothingIsComputed) {
+    const std::string start = "precompute builtin:cornell" + small_settings;
+    expect_failure(run(start + " -o" + quoted(folder.path("no/such/t"))), 1);
+    expect_failure(run(start + " -o" + quoted(folder.path("."))), 1);
+    expect_failure(run(start + " -o" + quoted(folder.path("t")) + " --report"
+                       + quoted(folder.path("no/such/r.json"))),
+                   1);
+    expect_failure(
+        run("precompute" + quoted(folder.path("none.obj")) + " -o" + quoted(folder.path("t"))), 1);
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST_F(CommandTransfer, AFullDiskIsStatusOneAndLeavesTheOldFile) {
+    expect_failure(run("precompute builtin:cornell --quiet -o /dev/full" + small_settings), 1);
+    const std::string path = folder.write("t", "old");
+    // Writing beyond the limit of file sizes fails as on a full disk; in blocks of 512 or 1024
+    // bytes.
+    expect_failure(run("precompute builtin:cornell --quiet -o" + quoted(path) + small_settings,
+                       "trap '' XFSZ; ulimit -f 20; "),
+                   1);
+    EXPECT_EQ(content_of(path), "old");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST_F(CommandTransfer, RenderMakesEachLayerWithItsProvenance) {
+    std::map<std::string, Image> layer;
+    for (const char* name : {"direct", "indirect", "full", "irradiance"}) {
+        const std::string path = folder.path(std::string(name) + ".exr");
+        const Outcome made = run("render" + quoted(file()) + " -o" + quoted(path) + " --layer "
+                                 + name + light + camera);
+        ASSERT_EQ(made.status, 0) << made.err;
+        EXPECT_EQ(made.out, "");
+        layer[name] = read_exr(path);
+        EXPECT_EQ(layer[name].attributes.at("afterglow.layer"), name);
+        EXPECT_EQ(layer[name].attributes.at("afterglow.uncovered_pixels"), "0");
+        EXPECT_TRUE(layer[name].attributes.contains("afterglow.scene_hash"));
+    }
+    double sum = 0.0;
+    for (std::size_t k = 0; k < layer["full"].rgb.size(); ++k) {
+        const float both = layer["direct"].rgb[k] + layer["indirect"].rgb[k];
+        // Three roundings to half, of eleven bits.
+        EXPECT_NEAR(layer["full"].rgb[k], both, 2e-3f * both);
+        EXPECT_GE(layer["irradiance"].rgb[k], layer["indirect"].rgb[k]);
+        sum += layer["indirect"].rgb[k];
+    }
+    EXPECT_GT(sum, 0.0);
+}
+
+TEST_F(CommandTransfer, RenderIsTheSameOnAnyNumberOfThreads) {
+    std::string pictures[2];
+    for (int threads : {1, 2}) {
+        const Outcome made =
+            run("render" + quoted(file()) + " --quiet --layer full --threads "
+                + std::to_string(threads) + " -o" + quoted(folder.path("a.png")) + light + camera);
+        EXPECT_EQ(made.status, 0) << made.err;
+        EXPECT_EQ(made.err, "");
+        pictures[threads - 1] = content_of(folder.path("a.png"));
+    }
+    EXPECT_EQ(pictures[0], pictures[1]);
+}
+
+TEST_F(CommandTransfer, QueryIsCloseToTheReference) {
+    const std::string points = folder.write(
+        "p.csv", "x,y,z,nx,ny,nz\n0.1,0,0.1,0,1,0\n0.3,0.3,0.5592,0,0,-1\n0.2,0.5488,0.2,0,-1,0\n");
+    const Outcome made = run("query" + quoted(file()) + " --points" + quoted(points) + " -o"
+                             + quoted(folder.path("a.csv")) + light);
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_EQ(made.out + made.err, "");
+    run("reference builtin:cornell --spp 16384 --points" + quoted(points) + " -o"
+        + quoted(folder.path("b.csv")) + light);
+    const Eigen::Array3Xf e = read_irradiance_csv(folder.path("a.csv"));
+    const Eigen::Array3Xf reference = read_irradiance_csv(folder.path("b.csv"));
+    ASSERT_EQ(e.cols(), 3);
+    // A few hundred points for the whole box: right in size, not more.
+    EXPECT_LT((e - reference).abs().mean(), 0.25f * reference.mean());
+}
+
+TEST_F(CommandTransfer, PointsThatNothingCoversAreCounted) {
+    const std::string points =
+        folder.write("p.csv", "0.1,0,0.1,0,1,0\n0.278,0.273,-5,0,0,-1\n0.1,0,0.1,0,-1,0\n");
+    const std::string query = "query" + quoted(file()) + " --points" + quoted(points) + " -o"
+                              + quoted(folder.path("a.csv")) + light;
+    const Outcome made = run(query);
+    EXPECT_EQ(made.status, 0);
+    EXPECT_NE(made.err.find("2 of 3 points"), std::string::npos) << made.err;
+    const Eigen::Array3Xf e = read_irradiance_csv(folder.path("a.csv"));
+    EXPECT_TRUE((e.col(0) > 0.0f).all());
+    EXPECT_TRUE((e.rightCols(2) == 0.0f).all());
+    EXPECT_EQ(run(query + " --quiet").err, "");
+}
+
+TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
+    const Outcome text = run("info" + quoted(file()));
+    EXPECT_EQ(text.status, 0) << text.err;
+    EXPECT_NE(text.out.find("builtin:cornell"), std::string::npos);
+    const Outcome json = run("info --json" + quoted(file()));
+    EXPECT_EQ(json.status, 0) << json.err;
+    EXPECT_EQ(json.out.find('\n'), json.out.size() - 1);
+    for (const char* key : {"\"levels\":[{", "\"functions\":", "\"links\":", "\"bytes\":{",
+                            "\"options\":{", "\"scene_hash\":", "\"largest_gap\":"})
+        EXPECT_NE(json.out.find(key), std::string::npos) << key;
+    EXPECT_EQ(text.err + json.err, "");
+}
+
+TEST_F(CommandTransfer, ASceneThatHasChangedIsRefusedByItsHash) {
+    const std::string obj =
+        folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 3\nf 1 2 4\n");
+    ASSERT_EQ(run("precompute" + quoted(obj) + " --quiet --viewpoint 0.3,0.3,0.3 -o"
+                  + quoted(folder.path("t")) + small_settings)
+                  .status,
+              0);
+    const std::string render = "render" + quoted(folder.path("t")) + " --quiet -o"
+                               + quoted(folder.path("a.png")) + light + camera;
+    ASSERT_EQ(run(render).status, 0);
+    std::filesystem::remove(folder.path("a.png"));
+    std::filesystem::copy_file(obj, folder.path("copy.obj"));
+
+    folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n");
+    const Outcome changed = run(render);
+    expect_failure(changed, 1);
+    EXPECT_NE(changed.err.find("content hash"), std::string::npos);
+    std::filesystem::remove(obj);
+    const Outcome missing = run(render);
+    expect_failure(missing, 1);
+    EXPECT_NE(missing.err.find("--scene"), std::string::npos);
+    expect_failure(run(render + " --scene builtin:cornell"), 1);
+    EXPECT_FALSE(std::filesystem::exists(folder.path("a.png")));
+    EXPECT_EQ(run(render + " --scene" + quoted(folder.path("copy.obj"))).status, 0);
+}
+
+TEST_F(CommandTransfer, WrongUseOfATransferFileIsToldInOneLine) {
+    const std::string picture = " -o" + quoted(folder.path("a.png"));
+    const std::string render = "render" + quoted(file()) + picture + light;
+    for (const std::string& arguments :
+         {render, render + camera + " --layer glossy", render + camera + " --samples 0",
+          render + camera + " --exposure 0", render + camera + " --spp 3",
+          "render" + quoted(file()) + picture + camera, "render" + picture + light + camera,
+          "query" + quoted(file()) + " -o" + quoted(folder.path("a.csv")) + light,
+          std::string("info"), "render" + quoted(file()) + " -o a.jpg" + light + camera}) {
+        SCOPED_TRACE(arguments);
+        expect_failure(run(arguments), 2);
+    }
+    const TemporaryFolder inputs;
+    const std::string no_transfer = quoted(inputs.write("a.obj", "v 0 0 0\n"));
+    for (const std::string& arguments :
+         {"render" + no_transfer + picture + light + camera, "info" + no_transfer,
+          "info" + quoted(folder.path("none")),
+          "render" + quoted(file()) + " -o" + quoted(folder.path("no/such/a.exr")) + light + camera,
+          "query" + quoted(file()) + " --points" + no_transfer + " -o"
+              + quoted(folder.path("a.csv")) + light}) {
+        SCOPED_TRACE(arguments);
+        expect_failure(run(arguments), 1);
+    }
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+} // namespace
+} // namespace afterglow
