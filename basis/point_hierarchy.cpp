@@ -46,17 +46,19 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
     PointHierarchy hierarchy;
     hierarchy.shape = options.shape;
     hierarchy.level_begin = {0};
-    std::vector<std::vector<Candidate>> levels(options.levels);
-    std::vector<std::vector<float>> supports(options.levels);
-    for (int l = 0; l < options.levels; ++l) {
-        const float spacing = std::ldexp(options.coarse_radius, -l);
-        const bool by_openness = options.openness_density > 0.0f && l == options.levels - 1;
+    const int level_count = options.levels + (options.display ? 1 : 0);
+    std::vector<std::vector<Candidate>> levels(level_count);
+    std::vector<std::vector<float>> supports(level_count);
+    for (int l = 0; l < level_count; ++l) {
+        const DisplayLevel* display = l == options.levels ? &*options.display : nullptr;
+        const float spacing = display ? display->spacing : std::ldexp(options.coarse_radius, -l);
+        const bool by_openness = display && display->openness_density > 0.0f;
         PoissonDiskOptions disk_options;
         disk_options.spacing = spacing;
         disk_options.placement_power
             = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
-        disk_options.openness_density = by_openness ? options.openness_density : 0.0f;
+        disk_options.openness_density = by_openness ? display->openness_density : 0.0f;
         const PoissonDisk disk = poisson_disk(source, disk_options);
 
         std::vector<Vec3> positions;
@@ -65,11 +67,12 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
         if (by_openness) {
             supports[l] = adaptive_supports(levels[l], spacing);
         } else {
-            const float t = options.levels > 1 ? static_cast<float>(l) / (options.levels - 1) : 0.0f;
+            const float t = level_count > 1 ? static_cast<float>(l) / (level_count - 1) : 0.0f;
             const float reach = std::lerp(options.shape.reach_coarsest, options.shape.reach_finest, t);
             supports[l].assign(levels[l].size(), reach * spacing);
         }
         hierarchy.spacing.push_back(spacing);
+        hierarchy.parent_level.push_back(display ? display->parent : l - 1);
         hierarchy.level_begin.push_back(hierarchy.level_begin.back()
                                         + static_cast<std::uint32_t>(levels[l].size()));
         if (statistics)
@@ -82,7 +85,7 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
     hierarchy.support.resize(count);
     hierarchy.reflectance.resize(3, count);
     Index i = 0;
-    for (int l = 0; l < options.levels; ++l)
+    for (int l = 0; l < level_count; ++l)
         for (std::size_t k = 0; k < levels[l].size(); ++k, ++i) {
             hierarchy.position.col(i) = levels[l][k].at.position;
             hierarchy.normal.col(i) = levels[l][k].at.normal;

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace afterglow {
@@ -20,6 +21,7 @@ struct PointHierarchy {
     Eigen::Matrix3Xf reflectance;           // 3 x N, of the surface at the point
     std::vector<std::uint32_t> level_begin; // L + 1; level l is [level_begin[l], level_begin[l + 1])
     std::vector<float> spacing;             // L, the Poisson-disk radius R_l [world]
+    std::vector<int> parent_level;          // L, the coarser level that predicts it; -1 for none
     BasisShape shape;
 
     int levels() const { return static_cast<int>(spacing.size()); }
@@ -29,13 +31,19 @@ struct PointHierarchy {
     SurfacePoint point(Index i) const { return {position.col(i), normal.col(i)}; }
 };
 
+/// A last level, for display: its points lie denser where the openness feature changes.
+struct DisplayLevel {
+    float spacing = 0.0f;         // R on open ground [world]
+    int parent = 0;               // the level that predicts it
+    float openness_density = 0.1f; // s of PoissonDiskOptions; 0 for a plain level
+};
+
 struct HierarchyOptions {
-    float coarse_radius = 0.0f;  // R of level 0 [world]; halves from level to level
-    int levels = 5;              // all of them
-    BasisShape shape;
-    /// Density s of the openness feature on the finest level, 0 for a plain finest level.
-    float openness_density = 0.1f;
-    bool skip_narrow = true;     // on every level but an openness level
+    float coarse_radius = 0.0f; // R of level 0 [world]; halves from level to level
+    int levels = 4;             // the display level not counted
+    std::optional<DisplayLevel> display = {};
+    BasisShape shape = {};
+    bool skip_narrow = true; // on every level but an openness level
     std::uint64_t seed = 1;
 };
 

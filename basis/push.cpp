@@ -50,41 +50,20 @@ PushOperator make_push_operator(const ShepardBasis& basis) {
     for (int l = 1; l < points.levels(); ++l)
         parallel_for(points.end(l) - points.begin(l), [&](Index k) {
             const Index i = points.begin(l) + k;
-            basis.evaluate_or_nearest(l - 1, points.point(i), rows[i]);
+            basis.evaluate_or_nearest(points.parent_level[l], points.point(i), rows[i]);
         });
     return {join_rows(std::move(rows))};
 }
 
-PullOperator::PullOperator(const PointHierarchy& points, const PushOperator& push, int levels,
-                           std::span<const float> area)
-    : levels_(levels) {
-    std::vector<std::vector<BasisEntry>> rows(points.end(levels - 1));
-    std::vector<double> mass(rows.size(), 0.0);
-    for (int l = levels - 1; l >= 0; --l)
-        for (Index i = points.begin(l); i < points.end(l); ++i) {
-            if (rows[i].empty()) mass[i] = area[i];
-            const auto index = push.parents.indices(i);
-            const auto weight = push.parents.values(i);
-            for (std::size_t e = 0; e < index.size(); ++e) {
-                const double share = mass[i] * weight[e];
-                if (!(share > 0.0)) continue;
-                rows[index[e]].push_back({static_cast<std::uint32_t>(i), static_cast<float>(share)});
-                mass[index[e]] += share;
-            }
-        }
-    for (std::size_t k = 0; k < rows.size(); ++k)
-        for (BasisEntry& entry : rows[k]) entry.value = static_cast<float>(entry.value / mass[k]);
-    children_ = join_rows(std::move(rows));
-}
-
-void PullOperator::pull(const PointHierarchy& points, int channels, std::span<float> values) const {
-    for (int l = levels_ - 2; l >= 0; --l)
+void PullOperator::pull(const PointHierarchy& points, int levels, int channels,
+                        std::span<float> values) const {
+    for (int l = levels - 2; l >= 0; --l)
         parallel_for(
             points.end(l) - points.begin(l),
             [&](Index k) {
                 const Index i = points.begin(l) + k;
-                const auto index = children_.indices(i);
-                const auto weight = children_.values(i);
+                const auto index = children.indices(i);
+                const auto weight = children.values(i);
                 if (index.empty()) return;
                 std::array<float, most_channels> sum{};
                 for (std::size_t e = 0; e < index.size(); ++e) {

@@ -10,7 +10,7 @@ namespace afterglow {
 /// How levels predict each other. A field has a value v_i at every point; a coefficient is what the
 /// coarser level did not predict, and *push* adds it up again, level by level:
 ///
-///     v_i = sum_k B_k(x_i) v_k + c_i,   k over the level above i's,  v_i = c_i on the coarsest.
+///     v_i = sum_k B_k(x_i) v_k + c_i,   k over the parent level of i's,  v_i = c_i on the coarsest.
 ///
 /// This is [LZT08, eq. (7)] with one change: each level predicts the next one's values, not every
 /// level all finer ones (eq. (6)), so that only one level is ever evaluated at a surface point.
@@ -30,25 +30,21 @@ struct PushOperator {
 PushOperator make_push_operator(const ShepardBasis& basis);
 
 /// The *pull* of [LZT08, sec. 2.1]: band-limits values before they are differenced, so that each
-/// level carries averages. From fine to coarse, over the children c of k on the next finer level,
+/// level carries averages. From fine to coarse, the field f of the next finer level is averaged with
+/// the coarser functions,
 ///
-///     v_k = sum_c a_c B_k(x_c) v_c / sum_c a_c B_k(x_c),     a_k = sum_c a_c B_k(x_c),
+///     v_k = <B_k, f> / <B_k, 1>,   f = sum_c B_c v_c,
 ///
-/// where a_c is the area that a function of the finest level speaks for: unlike the unweighted mean
-/// it keeps the total, sum_k a_k v_k, from level to level. A function without children keeps its own
-/// value.
-class PullOperator {
-public:
-    /// For the levels [0, levels) of the points. area: of each function [world^2]; only those of
-    /// functions without children are used.
-    PullOperator(const PointHierarchy& points, const PushOperator& push, int levels,
-                 std::span<const float> area);
-    /// In place; `channels` numbers a point.
-    void pull(const PointHierarchy& points, int channels, std::span<float> values) const;
+/// integrals over the surface. Since the B_k sum to one, sum_k <B_k, 1> v_k = <1, f>: no level has
+/// more or less of the light than the next. (The paper's v_k = sum_c B_k(x_c) v_c / sum_c B_k(x_c)
+/// loses some, or gains, where functions are unlike in size.)
+struct PullOperator {
+    /// A row a function of all levels but the finest: its children c on the next finer level with
+    /// <B_k, B_c> / <B_k, 1>. A function with an empty row keeps its own value.
+    SparseRows<float> children;
 
-private:
-    int levels_;
-    SparseRows<float> children_; // normalised rows
+    /// For the levels [0, levels), in place; `channels` numbers a point.
+    void pull(const PointHierarchy& points, int levels, int channels, std::span<float> values) const;
 };
 
 } // namespace afterglow

@@ -180,8 +180,6 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
                                                  : threshold_for_error(command.target_error);
     options.links.rays = std::max(16, static_cast<int>(std::bit_ceil(
                                           static_cast<unsigned>(options.links.rays))));
-    if (!given("--sender-levels"))
-        options.sender_levels = std::min(options.sender_levels, options.receiver_levels);
     check(options);
 }
 
@@ -212,9 +210,9 @@ void add_precompute_command(CLI::App& app) {
                "Distance between the coarsest points (default: a third of the typical distance "
                "between surfaces); halves from level to level");
     sub->add_option("--receiver-levels", command->options.receiver_levels,
-                    "Levels of points (default 5)");
+                    "Levels of receivers, each twice as fine as the one before (default 4)");
     sub->add_option("--sender-levels", command->options.sender_levels,
-                    "How many of them, from the coarsest on, also send light (default 4)");
+                    "Levels of senders, spaced alike (default 4)");
     sub->add_option("--rays", command->options.links.rays,
                     "Gather rays of each finest point, made a power of two (default 512); twice as "
                     "many a level up")

@@ -46,7 +46,7 @@ void GatherDirections::deal(Index receiver, Eigen::Matrix3Xf& directions) const 
     }
 }
 
-void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
+void trace_gather(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
                   const Footprint& footprint, std::vector<GatherSample>& samples) {
     const int rays = directions.rays();
@@ -69,6 +69,7 @@ void trace_gather(const Surface& surface, const SenderRows& rows, const PointHie
                 sample[k].finer_share = 0.0f;
                 sample[k].row = sample[k].finer_row = no_index;
                 if (!hit[k]) continue;
+                if (k % 4 == 0) rows.count(hit[k]);
                 const float at = footprint.level(hit[k]);
                 const int level = static_cast<int>(at);
                 sample[k].row = rows.number(hit[k], level);

@@ -28,7 +28,7 @@ struct GatherSample {
 /// is a constant of the operator, not of the ray count, so that receivers and their parents resolve
 /// alike.
 struct Footprint {
-    float angle = 0.05f;
+    float angle = 0.02f;
     float coarsest_spacing = 1.0f; // R_0 [world]
     int levels = 1;
 
@@ -55,8 +55,9 @@ private:
     std::array<std::uint32_t, 2> shift_;
 };
 
-/// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k].
-void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
+/// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k]. A quarter of
+/// them is counted in `rows`.
+void trace_gather(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
                   const Footprint& footprint, std::vector<GatherSample>& samples);
 

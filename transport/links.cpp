@@ -52,7 +52,8 @@ public:
               std::span<const PushedRow> parents, const LevelThresholds& thresholds,
               std::vector<LinkEntry>& kept, PushedRow& pushed, std::uint64_t& links_before) {
         gather(samples);
-        if (level > 0) subtract_prediction(i, points_.begin(level - 1), parents);
+        if (level > 0)
+            subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
         threshold(level, thresholds.kept, kept, links_before);
         if (thresholds.has_children) push_down(kept, thresholds.negligible, pushed);
         link_.clear();
@@ -175,8 +176,11 @@ private:
 
 } // namespace
 
-GatherDirections gather_directions(const LinkOptions& options, int level, int levels) {
-    const std::int64_t rays = static_cast<std::int64_t>(options.rays) << (levels - 1 - level);
+GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,
+                                   int level) {
+    const int coarser = static_cast<int>(
+        std::lround(std::log2(points.spacing[level] / points.spacing.back())));
+    const std::int64_t rays = static_cast<std::int64_t>(options.rays) << std::max(0, coarser);
     return {static_cast<int>(std::min<std::int64_t>(std::max(options.most_rays, options.rays), rays)),
             hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
@@ -189,14 +193,19 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     std::vector<GatherSample> samples;
     std::vector<std::uint32_t> needed;
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
+    const int display = points.levels() - 1;
     for (int l = 0; l < points.levels(); ++l) {
-        const GatherDirections directions = gather_directions(options, l, points.levels());
+        statistics.links.push_back(0);
+        if (l > points.parent_level[display] && l != display) continue; // senders alone
+        const GatherDirections directions = gather_directions(options, points, l);
         // A pushed link an eighth of the children's threshold decides nothing there.
-        const float kept = options.threshold * points.spacing.back() / points.spacing[l];
-        const bool has_children = l + 1 < points.levels();
-        const LevelThresholds thresholds{
-            kept, has_children,
-            has_children ? 0.125f * kept * points.spacing[l] / points.spacing[l + 1] : 0.0f};
+        const float finer = points.spacing.back() / points.spacing[l];
+        const float kept = options.threshold * finer * finer * finer;
+        const int children = l == points.parent_level[display] ? display : l + 1;
+        const LevelThresholds thresholds{kept, l != display,
+                                         l == display ? 0.0f
+                                                      : 0.125f * options.threshold
+                                                            * std::pow(points.spacing.back() / points.spacing[children], 3.0f)};
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
@@ -232,7 +241,6 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
             for (const std::uint64_t b : before) statistics.links_before += b;
             statistics.links_seconds += seconds_since(start);
         }
-        statistics.links.push_back(0);
         for (Index i = points.begin(l); i < points.end(l); ++i) statistics.links.back() += done[i].size();
     }
     statistics.patches = rows.made();

@@ -23,11 +23,12 @@ using Links = SparseRows<LinkValue>;
 struct LinkOptions {
     int rays = 512; // of a receiver on the finest level; a power of two; twice as many a level up
     int most_rays = 16384;
-    float footprint_angle = 0.05f; // see Footprint
-    /// A link d of a receiver on level l is kept where |d| R_l > threshold R_L (R_L: spacing of the
-    /// finest level), so that every stored link buys about the same error over the scene. What is dropped of the coarsest senders goes onto those that stay, so that the response to uniform
-    /// light stays exact.
-    float threshold = 5e-3f;
+    float footprint_angle = 0.02f; // see Footprint
+    /// A link d of a receiver on level l is kept where |d| R_l^3 > threshold R_L^3 (R_L: spacing of
+    /// the display level). The few coarse receivers are exact, at the price of few links: what they
+    /// lose, all finer ones lose in the same direction, as bias. What is dropped of the coarsest senders goes onto those that stay,
+    /// so that the response to uniform light stays exact.
+    float threshold = 4e-2f;
     std::uint64_t seed = 1;
 };
 
@@ -39,7 +40,8 @@ struct LinkStatistics {
 };
 
 /// The rays of the receivers of one level, of so many.
-GatherDirections gather_directions(const LinkOptions& options, int level, int levels);
+GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,
+                                   int level);
 
 /// Gathers, differences and thresholds the links of every receiver, level by level.
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,

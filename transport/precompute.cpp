@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 
+#include <algorithm>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -21,11 +22,10 @@ constexpr float finest_sender_share = 0.04f;
 } // namespace
 
 void check(const PrecomputeOptions& options) {
-    if (options.receiver_levels < 1 || options.receiver_levels > 10)
-        throw UsageError("--receiver-levels must lie between 1 and 10");
-    if (options.sender_levels < 1 || options.sender_levels > options.receiver_levels)
-        throw UsageError("--sender-levels must lie between 1 and the number of receiver levels ("
-                         + std::to_string(options.receiver_levels) + ")");
+    if (options.receiver_levels < 2 || options.receiver_levels > 10)
+        throw UsageError("--receiver-levels must lie between 2 and 10");
+    if (options.sender_levels < 1 || options.sender_levels > 10)
+        throw UsageError("--sender-levels must lie between 1 and 10");
     if (!(options.coarse_radius >= 0.0f) || !std::isfinite(options.coarse_radius))
         throw UsageError("--coarse-radius must be positive");
     const int rays = options.links.rays;
@@ -52,9 +52,10 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
         = options.coarse_radius > 0.0f
               ? options.coarse_radius
               : std::ldexp(finest_sender_share * static_cast<float>(r.mean_ray_length), 3);
-    hierarchy.levels = options.receiver_levels;
+    hierarchy.levels = std::max(options.receiver_levels - 1, options.sender_levels);
+    hierarchy.display = {std::ldexp(hierarchy.coarse_radius, 1 - options.receiver_levels),
+                         options.receiver_levels - 2, options.openness_density};
     hierarchy.shape = options.shape;
-    hierarchy.openness_density = options.receiver_levels > options.sender_levels ? options.openness_density : 0.0f;
     hierarchy.seed = options.seed;
     transfer.points = build_hierarchy(source, hierarchy, &r.hierarchy);
     r.points_seconds = seconds_since(start);
@@ -69,7 +70,7 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     LinkOptions links = options.links;
     links.seed = options.seed;
     transfer.links = make_links(surface, transfer.points, transfer.push, rows, links, r.links);
-    transfer.area = rows.areas();
+    transfer.pull = rows.make_pull_operator();
     r.total_seconds = seconds_since(start);
     return transfer;
 }

@@ -15,11 +15,15 @@ namespace afterglow {
 struct PrecomputeOptions {
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
     float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length
-    int receiver_levels = 5;
-    int sender_levels = 4;         // the first of the receivers' levels
+    /// Levels of receivers, spacing R, R/2, R/4 ...; the last is the display level.
+    int receiver_levels = 4;
+    /// Levels of senders, spaced alike; they share the points of the receivers' levels but the
+    /// display level's. Finer ones send what lands on them first, and hand on, for all further
+    /// bounces, what the coarser ones receive.
+    int sender_levels = 4;
     LinkOptions links;
     BasisShape shape;
-    float openness_density = 0.1f; // of the finest receivers, see PoissonDiskOptions
+    float openness_density = 0.1f; // of the display level, see DisplayLevel
     bool see_walls = true;
     std::uint64_t seed = 1;
 };

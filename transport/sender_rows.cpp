@@ -4,6 +4,8 @@
 #include "core/parallel.h"
 
 #include <algorithm>
+#include <unordered_map>
+#include <utility>
 
 namespace afterglow {
 
@@ -17,6 +19,7 @@ SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int le
     }
     if (count >= no_index) throw Error("too many surface patches; choose a larger --coarse-radius");
     place_.resize(count);
+    hits_.resize(grid_.back().patch_count(), 0);
 }
 
 void SenderRows::require(std::span<const std::uint32_t> numbers) {
@@ -46,24 +49,56 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
         throw Error("too many sender rows; choose a larger --coarse-radius");
 }
 
-std::vector<float> SenderRows::areas() const {
+PullOperator SenderRows::make_pull_operator() {
     const PointHierarchy& points = basis_.points();
-    const PatchGrid& grid = grid_.back();
-    std::vector<double> sum(points.end(levels() - 1), 0.0);
-    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
-        const Place& p = place_[first_.back() + patch];
-        if (p.count == not_made || p.count == 0) continue;
-        const double area = grid.area(patch);
-        for (std::uint32_t e = p.begin; e < p.begin + p.count; ++e)
-            sum[entries_[e].index] += area * entries_[e].value;
+    const PatchGrid& finest = grid_.back();
+    std::vector<std::uint32_t> patches; // those that were met
+    for (std::uint32_t patch = 0; patch < finest.patch_count(); ++patch)
+        if (hits_[patch] > 0) patches.push_back(patch);
+    const auto count = static_cast<Index>(patches.size());
+    std::vector<std::vector<std::uint32_t>> seen(levels()); // number of each patch's row on a level
+    for (int l = 0; l < levels(); ++l) {
+        seen[l].resize(patches.size());
+        parallel_for(count, [&](Index p) {
+            seen[l][p] = number(finest.center(patches[p]), l);
+        });
+        require(seen[l]);
     }
-    // A function whose surroundings no ray met, or one of a coarser level that has no children, gets
-    // what its disk would have.
-    std::vector<float> areas(sum.size());
-    for (int l = 0; l < levels(); ++l)
-        for (std::uint32_t i = points.begin(l); i < points.end(l); ++i)
-            areas[i] = static_cast<float>(sum[i] > 0.0 ? sum[i] : points.spacing[l] * points.spacing[l]);
-    return areas;
+
+    std::vector<std::vector<BasisEntry>> rows(points.end(levels() - 1));
+    for (int l = 0; l + 1 < levels(); ++l) {
+        // Turned around: the patches in which each function of the level is seen.
+        std::vector<std::vector<std::pair<std::uint32_t, float>>> sees(points.end(l) - points.begin(l));
+        for (std::uint32_t p = 0; p < patches.size(); ++p)
+            for (const BasisEntry& entry : row(seen[l][p]))
+                if (entry.index >= points.begin(l))
+                    sees[entry.index - points.begin(l)].push_back(
+                        {p, static_cast<float>(hits_[patches[p]]) * entry.value});
+        parallel_ranges(static_cast<Index>(sees.size()), 64, [&](Index first, Index last) {
+            std::unordered_map<std::uint32_t, double> sum;
+            for (Index k = first; k < last; ++k) {
+                sum.clear();
+                double total = 0.0;
+                for (const auto& [p, weight] : sees[k])
+                    for (const BasisEntry& child : row(seen[l + 1][p]))
+                        if (child.index >= points.begin(l + 1)) {
+                            sum[child.index] += static_cast<double>(weight) * child.value;
+                            total += static_cast<double>(weight) * child.value;
+                        }
+                std::vector<BasisEntry>& children = rows[points.begin(l) + k];
+                for (const auto& [child, share] : sum)
+                    if (share > 1e-3 * total) children.push_back({child, 0.0f});
+                std::sort(children.begin(), children.end(),
+                          [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
+                total = 0.0;
+                for (const BasisEntry& child : children) total += sum[child.index];
+                for (BasisEntry& child : children)
+                    child.value = static_cast<float>(sum[child.index] / total);
+            }
+        });
+    }
+    rows.resize(points.begin(levels() - 1));
+    return {join_rows(std::move(rows))};
 }
 
 } // namespace afterglow

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "basis/push.h"
 #include "basis/shepard_basis.h"
 #include "transport/patches.h"
 
@@ -36,9 +37,15 @@ public:
         __builtin_prefetch(entries_.data() + place_[number].begin);
         __builtin_prefetch(entries_.data() + place_[number].begin + 8);
     }
-    /// Area that each function of the finest level speaks for, from the patches that were met on
-    /// that level; of the level's mean where it was not [world^2]. A number a sender.
-    std::vector<float> areas() const;
+    /// Counts a gather ray that ends here. May be called concurrently.
+    void count(const Hit& hit) {
+        std::atomic_ref(hits_[grid_.back().patch_of(hit)]).fetch_add(1, std::memory_order_relaxed);
+    }
+    /// The pull between the levels. Its integrals run over the patches of the finest level, each
+    /// weighted with the rays that were counted there: it is the light that arrives at the receivers
+    /// which is the same on every level, not the light that leaves, of which some is never seen.
+    /// Not to be called concurrently.
+    PullOperator make_pull_operator();
 
     std::size_t made() const { return made_; }
     std::size_t uncovered() const { return uncovered_; } // rows that are empty
@@ -53,6 +60,7 @@ private:
     std::vector<PatchGrid> grid_;       // a level each
     std::vector<std::uint32_t> first_;  // of a level's rows
     std::vector<Place> place_;
+    std::vector<std::uint32_t> hits_;   // a patch of the finest level each
     std::vector<BasisEntry> entries_;
     std::size_t made_ = 0, uncovered_ = 0;
 };

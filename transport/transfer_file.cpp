@@ -64,6 +64,7 @@ std::string opened_scene_path(const std::string& file, const std::string& stored
 std::string model_text(const TransferOperator& transfer) {
     return Json{{"operator", operator_name},
                 {"sender_levels", transfer.sender_levels},
+                {"display_parent", transfer.points.parent_level.back()},
                 {"bounces", transfer.bounces},
                 {"weight_power", transfer.points.shape.weight_power}}
         .dump();
@@ -81,7 +82,7 @@ public:
         read_points(result.transfer.points);
         read_model(result.transfer);
         read_push(result.transfer);
-        read_area(result.transfer);
+        read_pull(result.transfer);
         read_links(result.transfer);
         read_provenance(result.provenance);
         for (const Tensor& tensor : file_.tensors())
@@ -148,7 +149,11 @@ private:
         const Json model = parse("model");
         if (model.value("operator", Json()) != operator_name)
             fail("holds an operator that this program does not know");
-        transfer.sender_levels = integer(model, "sender_levels", 1, transfer.points.levels());
+        const int levels = transfer.points.levels();
+        transfer.sender_levels = integer(model, "sender_levels", 1, levels);
+        for (int l = 0; l < levels; ++l) transfer.points.parent_level.push_back(l - 1);
+        if (levels > 1)
+            transfer.points.parent_level.back() = integer(model, "display_parent", 0, levels - 2);
         transfer.bounces = integer(model, "bounces", 0, most_bounces);
         transfer.points.shape.weight_power = integer(model, "weight_power", 1, 1000);
         if (transfer.senders() == 0) fail("has no senders");
@@ -206,19 +211,30 @@ private:
         check_rows("push.index", rows.begin, index, 0, points.end(0), 0, 0);
         for (int l = 1; l < points.levels(); ++l)
             check_rows("push.index", rows.begin, index, points.begin(l), points.end(l),
-                       points.begin(l - 1), points.end(l - 1));
-        if (!std::all_of(value.begin(), value.end(), [](float x) { return x >= 0.0f && x < 2.0f; }))
-            fail("has a push weight that is no share");
+                       points.begin(points.parent_level[l]), points.end(points.parent_level[l]));
+        check_shares("push", value);
         rows.index = shared(index);
         rows.value = shared(value);
     }
 
-    void read_area(TransferOperator& transfer) const {
-        const auto area = tensor<float>("senders.area", {transfer.senders()});
-        if (!std::all_of(area.begin(), area.end(),
-                         [](float x) { return x > 0.0f && std::isfinite(x); }))
-            fail("has a sender whose area is not positive");
-        transfer.area.assign(area.begin(), area.end());
+    void read_pull(TransferOperator& transfer) const {
+        const PointHierarchy& points = transfer.points;
+        SparseRows<float>& rows = transfer.pull.children;
+        const std::uint32_t pulled = points.begin(transfer.sender_levels - 1);
+        const auto index = tensor<std::uint32_t>("pull.index", {any_extent});
+        const auto value = tensor<float>("pull.value", {index.size()});
+        rows.begin = read_begin("pull.begin", pulled, index.size());
+        for (int l = 0; l + 1 < transfer.sender_levels; ++l)
+            check_rows("pull.index", rows.begin, index, points.begin(l), points.end(l),
+                       points.begin(l + 1), points.end(l + 1));
+        check_shares("pull", value);
+        rows.index = shared(index);
+        rows.value = shared(value);
+    }
+
+    void check_shares(const std::string& name, std::span<const float> value) const {
+        if (!std::all_of(value.begin(), value.end(), [](float x) { return x >= 0.0f && x < 2.0f; }))
+            fail("has a " + name + " weight that is no share");
     }
 
     void read_links(TransferOperator& transfer) const {
@@ -292,6 +308,7 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
                    const TransferProvenance& provenance) {
     const PointHierarchy& points = transfer.points;
     const SparseRows<float>& push = transfer.push.parents;
+    const SparseRows<float>& pull = transfer.pull.children;
     const Links& links = transfer.links;
     const std::uint64_t count = points.size(), levels = points.spacing.size();
     const auto floats = [](std::string name, TensorShape shape, std::span<const float> values) {
@@ -317,7 +334,9 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
         make_tensor("push.begin", {count + 1}, push.begin.span()),
         make_tensor("push.index", {push.entries()}, push.index.span()),
         make_tensor("push.value", {push.entries()}, push.value.span()),
-        floats("senders.area", {transfer.senders()}, transfer.area),
+        make_tensor("pull.begin", {pull.begin.size()}, pull.begin.span()),
+        make_tensor("pull.index", {pull.entries()}, pull.index.span()),
+        make_tensor("pull.value", {pull.entries()}, pull.value.span()),
         make_tensor("links.begin", {count + 1}, links.begin.span()),
         sender,
         make_tensor("links.value", {links.entries(), 3}, halves)};

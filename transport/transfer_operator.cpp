@@ -8,7 +8,7 @@
 namespace afterglow {
 
 LightTransport::LightTransport(const TransferOperator& transfer)
-    : transfer_(transfer), pull_(transfer.points, transfer.push, transfer.sender_levels, transfer.area) {}
+    : transfer_(transfer) {}
 
 Radiosity LightTransport::direct_radiosity(const Surface& surface, const Spotlight& light) const {
     const PointHierarchy& points = transfer_.points;
@@ -26,7 +26,7 @@ Radiosity LightTransport::direct_radiosity(const Surface& surface, const Spotlig
 std::vector<float> LightTransport::coefficients(const Radiosity& radiosity) const {
     const PointHierarchy& points = transfer_.points;
     std::vector<float> values(radiosity);
-    pull_.pull(points, 3, values);
+    transfer_.pull.pull(points, transfer_.sender_levels, 3, values);
     transfer_.push.difference(points, transfer_.sender_levels, 3, values);
     std::vector<float> padded(4 * static_cast<std::size_t>(transfer_.senders()), 0.0f);
     for (std::size_t m = 0; m < transfer_.senders(); ++m) std::copy_n(&values[3 * m], 3, &padded[4 * m]);

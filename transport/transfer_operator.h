@@ -15,17 +15,21 @@ namespace afterglow {
 inline constexpr int most_bounces = 1000; // that may be asked for by number
 
 /// All that a transfer file holds: the basis and the one-bounce operator over it. Senders are the
-/// points of the first `sender_levels` levels, receivers are all.
+/// points of the first `sender_levels` levels; receivers are those of the display level, the last,
+/// and of its parent level and above.
 struct TransferOperator {
     PointHierarchy points;
     int sender_levels = 0;
     PushOperator push;
-    std::vector<float> area; // that a sender speaks for [world^2], see PullOperator
+    PullOperator pull; // of the senders
     Links links;
     int bounces = 0; // of indirect light, 0: all of them
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
     int display_level() const { return points.levels() - 1; }
+    bool receives(int level) const {
+        return level == display_level() || level <= points.parent_level.back();
+    }
 };
 
 /// Three numbers (R, G, B) a sender point: its radiosity [W/m^2].
@@ -73,8 +77,6 @@ public:
 
 private:
     const TransferOperator& transfer_;
-    PullOperator pull_;
-
     /// Pulled and differenced, four floats a sender (the last zero).
     std::vector<float> coefficients(const Radiosity& radiosity) const;
     VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;

@@ -25,7 +25,7 @@ TEST(PointHierarchy, HalvesItsSpacingFromLevelToLevel) {
     HierarchyStatistics statistics;
     const PointHierarchy points =
         make_hierarchy("builtin:two_rooms",
-                       {.coarse_radius = 1.0f, .levels = 4, .shape = {}, .openness_density = 0.0f},
+                       {.coarse_radius = 1.0f, .levels = 4},
                        1, &statistics);
     ASSERT_EQ(points.levels(), 4);
     ASSERT_EQ(points.level_begin.size(), 5u);
@@ -51,7 +51,8 @@ TEST(PointHierarchy, HalvesItsSpacingFromLevelToLevel) {
 
 TEST(PointHierarchy, OrdersEachLevelAlongAMortonCurve) {
     const PointHierarchy points =
-        make_hierarchy("builtin:cornell", {.coarse_radius = 0.1f, .levels = 3, .shape = {}});
+        make_hierarchy("builtin:cornell",
+                       {.coarse_radius = 0.1f, .levels = 2, .display = DisplayLevel{0.025f, 1}});
     for (int l = 0; l < 3; ++l) {
         std::vector<Vec3> positions;
         for (std::uint32_t i = points.begin(l); i < points.end(l); ++i)
@@ -64,7 +65,7 @@ TEST(PointHierarchy, OrdersEachLevelAlongAMortonCurve) {
 TEST(PointHierarchy, KeepsTheReflectanceOfTheSurface) {
     const Scene scene = make_builtin_scene("builtin:cornell");
     const PointHierarchy points =
-        make_hierarchy("builtin:cornell", {.coarse_radius = 0.1f, .levels = 2, .shape = {}});
+        make_hierarchy("builtin:cornell", {.coarse_radius = 0.1f, .levels = 2});
     int red = 0;
     for (std::uint32_t i = 0; i < points.size(); ++i) {
         const Vec3 x = points.position.col(i);
@@ -85,7 +86,7 @@ TEST(PointHierarchy, ReachesAsFarAsItsShapeSays) {
     shape.reach_finest = 2.5f;
     const PointHierarchy points = make_hierarchy(
         "builtin:cornell",
-        {.coarse_radius = 0.2f, .levels = 3, .shape = shape, .openness_density = 0.0f});
+        {.coarse_radius = 0.2f, .levels = 3, .shape = shape});
     for (int l = 0; l < 3; ++l)
         for (std::uint32_t i = points.begin(l); i < points.end(l); ++i)
             EXPECT_FLOAT_EQ(points.support[i], (1.5f + 0.5f * l) * points.spacing[l]);
@@ -93,7 +94,8 @@ TEST(PointHierarchy, ReachesAsFarAsItsShapeSays) {
 
 TEST(PointHierarchy, OverlapsAboutAsMuchWhereOpennessCrowdsItsFinestLevel) {
     const PointHierarchy points =
-        make_hierarchy("builtin:furnace", {.coarse_radius = 0.4f, .levels = 3, .shape = {}});
+        make_hierarchy("builtin:furnace",
+                       {.coarse_radius = 0.4f, .levels = 2, .display = DisplayLevel{0.1f, 1}});
     double in_edges = 0.0, in_faces = 0.0, mean_support[2] = {};
     int count_edges = 0, count_faces = 0, count_support[2] = {};
     const auto near_edge = [](const Vec3& x) {
@@ -130,7 +132,8 @@ TEST(PointHierarchy, DependsOnTheSeedButNotOnThreads) {
     const auto make = [](int threads, std::uint64_t seed) {
         const ThreadLimit limit(threads);
         return make_hierarchy("builtin:two_rooms",
-                              {.coarse_radius = 1.0f, .levels = 3, .shape = {}}, seed);
+                              {.coarse_radius = 1.0f, .levels = 2, .display = DisplayLevel{0.25f, 1}},
+                              seed);
     };
     const PointHierarchy one = make(1, 5), two = make(2, 5), other = make(2, 6);
     EXPECT_EQ(one.level_begin, two.level_begin);

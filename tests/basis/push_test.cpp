@@ -17,7 +17,9 @@ struct Example {
 
     Example() {
         CandidateSource source(surface, {*scene.viewpoint}, 1);
-        points = build_hierarchy(source, {.coarse_radius = 0.16f, .levels = 4, .shape = {}});
+        points = build_hierarchy(source, {.coarse_radius = 0.16f,
+                                          .levels = 3,
+                                          .display = DisplayLevel{0.03f, 1}});
         push = make_push_operator(ShepardBasis(points, surface, true));
     }
 };
@@ -66,7 +68,7 @@ TEST(PushOperator, HasParentsOnTheLevelAboveThatSumToOne) {
             }
             orphans += index.empty();
             row.clear();
-            basis.evaluate_or_nearest(l - 1, points.point(i), row);
+            basis.evaluate_or_nearest(points.parent_level[l], points.point(i), row);
             ASSERT_EQ(row.size(), index.size());
             float sum = 0.0f;
             for (std::size_t e = 0; e < index.size(); ++e) {
@@ -127,77 +129,16 @@ TEST(PushOperator, CarriesConstantsFromTheCoarsestLevelDown) {
     EXPECT_GT(count, 0.99 * points.size());
 }
 
-/// The area of each function of coarser levels as the header defines it, in double precision.
-std::vector<double> masses(const PointHierarchy& points, const PushOperator& push, int levels,
-                           const std::vector<float>& area, std::vector<char>& has_children) {
-    std::vector<double> mass(points.end(levels - 1), 0.0);
-    has_children.assign(mass.size(), 0);
-    for (int l = levels - 1; l >= 0; --l)
-        for (Index i = points.begin(l); i < points.end(l); ++i) {
-            if (!has_children[i]) mass[i] = area[i];
-            for (std::size_t e = 0; e < push.parents.indices(i).size(); ++e) {
-                mass[push.parents.indices(i)[e]] += mass[i] * push.parents.values(i)[e];
-                has_children[push.parents.indices(i)[e]] = 1;
-            }
-        }
-    return mass;
-}
-
-TEST(PullOperator, KeepsTheTotalFromLevelToLevel) {
-    const auto& [scene, surface, points, push] = example();
-    const int levels = 3;
-    std::vector<float> area = random_values(points.end(levels - 1), 3);
-    for (float& a : area)
-        a += 0.4f; // positive
-    std::vector<float> values = random_values(3 * points.end(levels - 1), 4);
-    PullOperator(points, push, levels, area).pull(points, 3, values);
-
-    std::vector<char> has_children;
-    const std::vector<double> mass = masses(points, push, levels, area, has_children);
-    for (int l = 0; l + 1 < levels; ++l)
-        for (int c = 0; c < 3; ++c) {
-            double above = 0.0, below = 0.0;
-            for (Index i = points.begin(l); i < points.end(l); ++i)
-                if (has_children[i]) above += mass[i] * values[3 * i + c];
-            for (Index i = points.begin(l + 1); i < points.end(l + 1); ++i)
-                if (!push.parents.indices(i).empty()) below += mass[i] * values[3 * i + c];
-            EXPECT_NEAR(above, below, 1e-5 * std::abs(below)) << "level " << l;
-        }
-}
-
-TEST(PullOperator, LeavesConstantsAndTheFinestLevelAlone) {
-    const auto& [scene, surface, points, push] = example();
-    const int levels = 3;
-    const std::vector<float> area(points.end(levels - 1), 0.3f);
-    const PullOperator pull(points, push, levels, area);
-    std::vector<float> constant(points.end(levels - 1), 2.5f);
-    pull.pull(points, 1, constant);
-    for (const float v : constant)
-        ASSERT_NEAR(v, 2.5f, 1e-5f);
-
-    const std::vector<float> before = random_values(points.end(levels - 1), 5);
-    std::vector<float> after = before;
-    pull.pull(points, 1, after);
-    for (Index i = points.begin(levels - 1); i < points.end(levels - 1); ++i)
-        ASSERT_EQ(after[i], before[i]);
-}
-
-TEST(PullOperator, WeighsChildrenByTheirAreas) {
-    // Three functions above four: 3 belongs to 0, a quarter of 4 to 0 and the rest to 1, 6 to 1;
-    // nobody covers 5, and 2 has no children.
+TEST(PullOperator, AveragesChildrenFromFineToCoarse) {
+    // 0 and 1 above 2 and 3, these above 4 and 5; 1 and 3 have no children.
     PointHierarchy points;
-    points.level_begin = {0, 3, 7};
-    points.spacing = {1.0f, 0.5f};
-    PushOperator push;
-    push.parents =
-        join_rows<float>({{}, {}, {}, {{0, 1.0f}}, {{0, 0.25f}, {1, 0.75f}}, {}, {{1, 1.0f}}});
-    const std::vector<float> area{99, 99, 7, 2, 4, 5, 1};
-    std::vector<float> values{-1, -2, -3, 10, 20, 30, 40};
-    PullOperator(points, push, 2, area).pull(points, 1, values);
-    EXPECT_FLOAT_EQ(values[0], (2 * 10 + 1 * 20) / 3.0f);
-    EXPECT_FLOAT_EQ(values[1], (3 * 20 + 1 * 40) / 4.0f);
-    EXPECT_FLOAT_EQ(values[2], -3.0f);
-    EXPECT_FLOAT_EQ(values[5], 30.0f);
+    points.level_begin = {0, 2, 4, 6};
+    points.spacing = {1.0f, 0.5f, 0.25f};
+    const PullOperator pull{
+        join_rows<float>({{{2, 0.25f}, {3, 0.75f}}, {}, {{4, 0.5f}, {5, 0.5f}}, {}})};
+    std::vector<float> values{-1, -10, -2, -20, -3, -30, 8, 80, 1, 10, 3, 30};
+    pull.pull(points, 3, 2, values);
+    EXPECT_EQ(values, (std::vector<float>{6.5f, 65, -2, -20, 2, 20, 8, 80, 1, 10, 3, 30}));
 }
 
 } // namespace

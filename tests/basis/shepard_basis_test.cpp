@@ -24,7 +24,8 @@ struct Example {
         CandidateSource source(surface, find_viewpoints(surface, 1), 1);
         HierarchyOptions options;
         options.coarse_radius = coarse_radius;
-        options.levels = 3;
+        options.levels = 2;
+        options.display = DisplayLevel{options.coarse_radius / 4.0f, 1};
         options.shape = shape;
         points = build_hierarchy(source, options);
     }

@@ -147,8 +147,8 @@ TEST(HostileTransferFile, NumbersThatCannotBeAreRefusedThoughTheChecksumsAreRigh
         {"reflectance NaN", set("points.reflectance", 5, nan)},
         {"spacing zero", set("spacing", 1, 0.0f)},
         {"spacing infinite", set("spacing", 1, infinite)},
-        {"area zero", set("senders.area", 0, 0.0f)},
-        {"area NaN", set("senders.area", 0, nan)},
+        {"pull NaN", set("pull.value", 0, nan)},
+        {"pull negative", set("pull.value", 0, -0.5f)},
         {"push NaN", set("push.value", 0, nan)},
         {"push negative", set("push.value", 0, -0.5f)},
         {"push huge", set("push.value", 0, 1e30f)},
@@ -193,6 +193,9 @@ TEST(HostileTransferFile, RowsThatAreNotRowsAreRefused) {
         {"push out of range", [](Parts& p) { p.values<std::uint32_t>("push.index").back() = ~0u; }},
         {"push from its own level",
          [=](Parts& p) { p.values<std::uint32_t>("push.index").back() = points - 1; }},
+        {"pull offset falls", set("pull.begin", 1, std::uint64_t(1) << 40)},
+        {"pull from its own level",
+         [](Parts& p) { p.values<std::uint32_t>("pull.index")[0] = 0; }},
         {"push past a level", [](Parts& p) { p.values<std::uint32_t>("push.index").back() = 0; }},
     });
 }
@@ -235,7 +238,8 @@ TEST(HostileTransferFile, SizesThatDoNotAgreeAreRefused) {
     };
     for (const char* name :
          {"points.position", "points.normal", "points.support", "points.reflectance", "level_begin",
-          "spacing", "push.begin", "push.index", "push.value", "senders.area", "links.begin",
+          "spacing", "push.begin", "push.index", "push.value", "pull.begin", "pull.index",
+          "pull.value", "links.begin",
           "links.sender", "links.value"}) {
         damages[std::string(name) + " is short"] = [=](Parts& p) {
             p.shorten(name, p.tensor(name).shape[0] - 1);

@@ -28,13 +28,14 @@ def apply_transfer(tensors, metadata, radiosity):
     entries = [slice(tensors["push.begin"][level[l]], tensors["push.begin"][level[l + 1]])
                for l in range(len(level) - 1)]  # of the points of each level
 
-    # Pull: a coarser point's value becomes the mean of those it predicts.
-    value, area = radiosity.astype(float), tensors["senders.area"][:, None].astype(float)
-    for e in reversed(entries[1:sender_levels]):
-        share = area[child[e]] * weight[e]
-        total = sums(parent[e], share, senders)
-        mean = sums(parent[e], share * value[child[e]], senders) / np.where(total > 0, total, 1)
-        value, area = np.where(total > 0, mean, value), np.where(total > 0, total, area)
+    # Pull: a coarser point's value becomes the mean of those that it sees below.
+    value = radiosity.astype(float)
+    index, share = tensors["pull.index"], tensors["pull.value"][:, None]
+    above = row_numbers(tensors["pull.begin"])
+    for l in reversed(range(sender_levels - 1)):
+        e = slice(tensors["pull.begin"][level[l]], tensors["pull.begin"][level[l + 1]])
+        mean = sums(above[e], share[e] * value[index[e]], senders)
+        value = np.where(np.bincount(above[e], minlength=senders)[:, None] > 0, mean, value)
 
     # Coefficients: what the next coarser level does not predict.
     e = slice(0, tensors["push.begin"][senders])

@@ -141,7 +141,6 @@ struct Senders {
         HierarchyOptions options;
         options.coarse_radius = coarse_radius;
         options.levels = levels;
-        options.openness_density = 0.0f;
         return build_hierarchy(source, options);
     }
 };
@@ -150,7 +149,7 @@ TEST(TraceGather, TurnsUniformRadiosityIntoTheNormal) {
     // (1 / pi) int_hemisphere omega d omega = n in a closed scene.
     const Scene scene = make_builtin_scene("builtin:two_rooms");
     const Surface surface(scene);
-    const Senders senders(surface, *scene.viewpoint, 1.0f, 1);
+    Senders senders(surface, *scene.viewpoint, 1.0f, 1);
     const std::vector<SurfacePoint> places = points_by_area(scene, 256, 3);
     constexpr int rays = 256;
     const GatherDirections directions(rays, 7);
@@ -179,7 +178,7 @@ TEST(TraceGather, NamesTheRowsOfWhatItMeetsAtTheLevelOfItsFootprint) {
     // In the cube [-1, 1]^3 distance and cosine are known.
     const Scene scene = make_builtin_scene("builtin:furnace");
     const Surface surface(scene);
-    const Senders senders(surface, Vec3::Zero(), 0.8f, 4);
+    Senders senders(surface, Vec3::Zero(), 0.8f, 4);
     const std::vector<SurfacePoint> places = points_by_area(scene, 64, 4);
     const Footprint footprint{.angle = 0.1f, .coarsest_spacing = 0.8f, .levels = 4};
     const GatherDirections directions(64, 7);
@@ -246,7 +245,7 @@ TEST(TraceGather, NamesTheRowsOfWhatItMeetsAtTheLevelOfItsFootprint) {
 TEST(TraceGather, MarksRaysThatLeaveTheScene) {
     const Scene scene = make_corner(1.0f);
     const Surface surface(scene);
-    const Senders senders(surface, Vec3(0.3f, 0.3f, 0.0f), 0.3f, 1);
+    Senders senders(surface, Vec3(0.3f, 0.3f, 0.0f), 0.3f, 1);
     const GatherDirections directions(64, 7);
     std::vector<GatherSample> samples;
     const SurfacePoint x{Vec3(0.5f, 0.0f, 0.0f), Vec3::UnitY()};

@@ -33,7 +33,6 @@ struct Example {
         HierarchyOptions options;
         options.coarse_radius = coarse_radius;
         options.levels = levels;
-        options.openness_density = 0.0f;
         return build_hierarchy(source, options);
     }
 

@@ -28,7 +28,7 @@ bool equal(const TransferOperator& a, const TransferOperator& b) {
                              y.value.span().end());
     };
     return a.points.level_begin == b.points.level_begin && a.points.position == b.points.position
-           && a.area == b.area && same_rows(a.push.parents, b.push.parents)
+           && same_rows(a.pull.children, b.pull.children) && same_rows(a.push.parents, b.push.parents)
            && same_rows(a.links, b.links);
 }
 
@@ -55,7 +55,7 @@ TEST(Precompute, MakesWhatItsOptionsSay) {
     EXPECT_EQ(transfer.sender_levels, 2);
     EXPECT_EQ(transfer.points.spacing[0], 0.2f);
     EXPECT_EQ(transfer.senders(), transfer.points.end(1));
-    EXPECT_EQ(transfer.area.size(), transfer.senders());
+    EXPECT_EQ(transfer.pull.children.rows(), transfer.points.begin(1));
     EXPECT_EQ(transfer.links.rows(), transfer.points.size());
     EXPECT_EQ(transfer.push.parents.rows(), transfer.points.size());
     EXPECT_GE(report.links.rays, 64u * transfer.points.size());
@@ -85,10 +85,10 @@ TEST(Precompute, RefusesImpossibleOptions) {
         change(options);
         EXPECT_THROW(precompute(surface, options), UsageError);
     };
-    expect_refusal([](auto& o) { o.receiver_levels = 0; });
+    expect_refusal([](auto& o) { o.receiver_levels = 1; });
     expect_refusal([](auto& o) { o.receiver_levels = 11; });
     expect_refusal([](auto& o) { o.sender_levels = 0; });
-    expect_refusal([](auto& o) { o.sender_levels = 4; });
+    expect_refusal([](auto& o) { o.sender_levels = 11; });
     expect_refusal([](auto& o) { o.coarse_radius = -1.0f; });
     expect_refusal([](auto& o) { o.coarse_radius = std::numeric_limits<float>::quiet_NaN(); });
     expect_refusal([](auto& o) { o.links.rays = 100; });

@@ -28,7 +28,6 @@ struct Example {
         HierarchyOptions options;
         options.coarse_radius = coarse_radius;
         options.levels = 3;
-        options.openness_density = 0.0f;
         return build_hierarchy(source, options);
     }
 };
@@ -115,31 +114,57 @@ TEST(SenderRows, AreTheSameInWhateverOrderTheyAreMade) {
         ASSERT_TRUE(equal(at_once.row(n), bit_by_bit.row(n)));
 }
 
-TEST(SenderRows, ShareOutTheAreaOfTheScene) {
-    // Six faces of 2 x 2; so many hits that every patch is met.
-    const Example example("builtin:furnace", 0.5f);
-    SenderRows rows(example.surface, example.basis, 3);
-    rows.require(numbers_of(rows, hits_on_fronts(example.scene, 50'000, 4)));
-    const std::vector<float> areas = rows.areas();
-    ASSERT_EQ(areas.size(), example.points.size());
-    double total = 0.0;
-    const double mean = 24.0 / (example.points.end(2) - example.points.begin(2));
-    for (std::uint32_t i = example.points.begin(2); i < example.points.end(2); ++i) {
-        EXPECT_GT(areas[i], 0.0f);
-        EXPECT_LT(areas[i], 4.0 * mean);
-        total += areas[i];
+TEST(SenderRows, PullWithoutLosingLight) {
+    // Sums over the rays that were counted: of what each level shows them, whatever is pulled.
+    const Example example("builtin:cornell", 0.2f);
+    constexpr int levels = 3;
+    SenderRows rows(example.surface, example.basis, levels, 0.25f);
+    const std::vector<Hit> hits = hits_on_fronts(example.scene, 20'000, 4);
+    for (const Hit& hit : hits)
+        rows.count(hit);
+    const PullOperator pull = rows.make_pull_operator();
+    ASSERT_EQ(pull.children.rows(), example.points.begin(levels - 1));
+
+    std::vector<float> values(example.points.end(levels - 1), 0.0f);
+    Rng rng(5, 0);
+    for (std::uint32_t i = example.points.begin(levels - 1); i < values.size(); ++i)
+        values[i] = example.points.position(0, i) < 0.2f ? 1.0f + rng.uniform() : 0.1f;
+    pull.pull(example.points, levels, 1, values);
+    rows.require(numbers_of(rows, hits));
+    std::vector<double> shown(levels, 0.0);
+    // At the finest patches' centres, where the integrals are taken.
+    const PatchGrid finest(example.scene, 0.25f * example.points.spacing[levels - 1]);
+    for (const Hit& hit : hits) {
+        const Hit centre = finest.center(finest.patch_of(hit));
+        for (int l = 0; l < levels; ++l) {
+            const std::uint32_t number = rows.number(centre, l);
+            rows.require(std::span(&number, 1));
+            for (const BasisEntry& entry : rows.row(number))
+                shown[l] += entry.value * values[entry.index];
+        }
     }
-    EXPECT_NEAR(total, 24.0, 0.05);
+    // Children below a thousandth are left out.
+    for (int l = 0; l + 1 < levels; ++l)
+        EXPECT_NEAR(shown[l], shown[levels - 1], 5e-3 * shown[levels - 1]) << "level " << l;
 }
 
-TEST(SenderRows, GiveFunctionsThatNoPatchMetTheirDisk) {
+TEST(SenderRows, PullConstantsToThemselves) {
     const Example example("builtin:furnace", 0.5f);
-    const SenderRows rows(example.surface, example.basis, 2);
-    const std::vector<float> areas = rows.areas();
-    ASSERT_EQ(areas.size(), example.points.end(1));
-    for (int l = 0; l < 2; ++l)
-        for (std::uint32_t i = example.points.begin(l); i < example.points.end(l); ++i)
-            EXPECT_FLOAT_EQ(areas[i], example.points.spacing[l] * example.points.spacing[l]);
+    SenderRows rows(example.surface, example.basis, 3);
+    for (const Hit& hit : hits_on_fronts(example.scene, 5'000, 4))
+        rows.count(hit);
+    const PullOperator pull = rows.make_pull_operator();
+    std::vector<float> values(example.points.end(2), 2.5f);
+    pull.pull(example.points, 3, 1, values);
+    for (const float v : values)
+        ASSERT_NEAR(v, 2.5f, 1e-5f);
+    EXPECT_GT(pull.children.entries(), 2 * example.points.begin(2));
+}
+
+TEST(SenderRows, LeaveFunctionsThatNoRayMetAsTheyAre) {
+    const Example example("builtin:furnace", 0.5f);
+    SenderRows rows(example.surface, example.basis, 2);
+    EXPECT_EQ(rows.make_pull_operator().children.entries(), 0u);
 }
 
 } // namespace

@@ -93,7 +93,8 @@ TransferOperator chain(std::uint32_t count) {
     points.level_begin = {0, count};
     points.spacing = {1.0f};
     transfer.sender_levels = 1;
-    transfer.area.assign(count, 1.0f);
+    points.parent_level = {-1};
+    transfer.pull.children = join_rows(std::vector<std::vector<BasisEntry>>());
     transfer.push.parents = join_rows(std::vector<std::vector<BasisEntry>>(count));
     std::vector<std::vector<SparseEntry<LinkValue>>> links(count);
     for (std::uint32_t i = 0; i + 1 < count; ++i)
