@@ -212,7 +212,7 @@ void add_precompute_command(CLI::App& app) {
     sub->add_option("--receiver-levels", command->options.receiver_levels,
                     "Levels of receivers, each twice as fine as the one before (default 4)");
     sub->add_option("--sender-levels", command->options.sender_levels,
-                    "Levels of senders, spaced alike (default 4)");
+                    "Levels of senders, spaced alike (default 3)");
     sub->add_option("--rays", command->options.links.rays,
                     "Gather rays of each finest point, made a power of two (default 512); twice as "
                     "many a level up")

@@ -28,7 +28,7 @@ struct LinkOptions {
     /// the display level). The few coarse receivers are exact, at the price of few links: what they
     /// lose, all finer ones lose in the same direction, as bias. What is dropped of the coarsest senders goes onto those that stay,
     /// so that the response to uniform light stays exact.
-    float threshold = 4e-2f;
+    float threshold = 2e-2f;
     std::uint64_t seed = 1;
 };
 

@@ -20,7 +20,7 @@ struct PrecomputeOptions {
     /// Levels of senders, spaced alike; they share the points of the receivers' levels but the
     /// display level's. Finer ones send what lands on them first, and hand on, for all further
     /// bounces, what the coarser ones receive.
-    int sender_levels = 4;
+    int sender_levels = 3;
     LinkOptions links;
     BasisShape shape;
     float openness_density = 0.1f; // of the display level, see DisplayLevel

@@ -240,14 +240,14 @@ TEST(Links, BecomeFewerAndLessExactAsTheThresholdGrows) {
     const Eigen::Matrix3Xd exact = example.field(all, coefficients);
     std::uint64_t last_count = all.entries();
     double last_error = 0.0;
-    for (const float threshold : {5e-4f, 2e-3f, 8e-3f}) {
+    for (const float threshold : {8e-3f, 3.2e-2f, 1.28e-1f}) {
         options.threshold = threshold;
         LinkStatistics s;
         const Links links = example.links(options, 0.5f, &s);
         const double error = (example.field(links, coefficients) - exact).norm() / exact.norm();
         EXPECT_LT(links.entries(), 0.8 * last_count);
         EXPECT_GT(error, last_error);
-        EXPECT_LT(error, 10.0 * threshold);
+        EXPECT_LT(error, 2.0 * threshold); // of the norm: what is dropped partly cancels
         last_count = links.entries();
         last_error = error;
         std::uint64_t counted = 0;
