@@ -7,14 +7,16 @@
 
 namespace afterglow {
 
-PatchGrid::PatchGrid(const Scene& scene, float size) : scene_(scene), cells_(scene.triangles.size()) {
+PatchGrid::PatchGrid(const Scene& scene, float size)
+    : scene_(scene), cells_(scene.triangles.size()) {
     constexpr float most_along = 1024.0f;
     std::uint64_t cells = 0;
     for (std::size_t t = 0; t < cells_.size(); ++t) {
         const Triangle& corner = scene.triangles[t];
         const Vec3& a = scene.positions[corner[0]];
         const auto along = [&](const Vec3& b) {
-            return static_cast<std::uint16_t>(std::clamp(std::ceil((b - a).norm() / size), 1.0f, most_along));
+            return static_cast<std::uint16_t>(
+                std::clamp(std::ceil((b - a).norm() / size), 1.0f, most_along));
         };
         cells_[t] = {static_cast<std::uint32_t>(cells), along(scene.positions[corner[1]]),
                      along(scene.positions[corner[2]])};
@@ -28,16 +30,18 @@ PatchGrid::PatchGrid(const Scene& scene, float size) : scene_(scene), cells_(sce
 
 PatchGrid::Location PatchGrid::locate(std::uint32_t patch) const {
     const std::uint32_t cell = patch / 2;
-    const auto next = std::upper_bound(cells_.begin(), cells_.end(), cell,
-                                       [](std::uint32_t c, const Cells& cells) { return c < cells.first; });
+    const auto next =
+        std::upper_bound(cells_.begin(), cells_.end(), cell,
+                         [](std::uint32_t c, const Cells& cells) { return c < cells.first; });
     const Cells& c = *(next - 1);
     return {static_cast<std::uint32_t>(next - 1 - cells_.begin()), (cell - c.first) % c.along_u,
             (cell - c.first) / c.along_u};
 }
 
 PatchGrid::Part PatchGrid::part(const Location& at) const {
-    // [u0, u1] x [v0, v1] below u + v = 1, where the triangle's third edge runs: the corner triangle
-    // that begins at (u0, v0), less those at (u1, v0) and (u0, v1), plus the one taken away twice.
+    // [u0, u1] x [v0, v1] below u + v = 1, where the triangle's third edge runs: the corner
+    // triangle that begins at (u0, v0), less those at (u1, v0) and (u0, v1), plus the one taken
+    // away twice.
     const Cells& c = cells_[at.triangle];
     Part part;
     for (int k = 0; k < 4; ++k) {
@@ -72,8 +76,8 @@ float PatchGrid::area(std::uint32_t patch) const {
     const Location at = locate(patch);
     const Triangle& corner = scene_.triangles[at.triangle];
     const Vec3& a = scene_.positions[corner[0]];
-    const float parallelogram
-        = (scene_.positions[corner[1]] - a).cross(scene_.positions[corner[2]] - a).norm();
+    const float parallelogram =
+        (scene_.positions[corner[1]] - a).cross(scene_.positions[corner[2]] - a).norm();
     return 0.5f * parallelogram * static_cast<float>(std::max(0.0, part(at).share));
 }
 

@@ -9,7 +9,8 @@
 
 namespace afterglow {
 
-SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels, float patch_share)
+SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels,
+                       float patch_share)
     : surface_(surface), basis_(basis) {
     std::uint64_t count = 0;
     for (int l = 0; l < levels; ++l) {
@@ -35,7 +36,8 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
             std::upper_bound(first_.begin(), first_.end(), missing[i]) - first_.begin() - 1);
         const SurfacePoint x = surface_.point(grid_[level].center(missing[i] - first_[level]));
         // Where the level has no function, the next coarser speaks for it.
-        for (int l = level; l >= 0 && rows[i].empty(); --l) basis_.evaluate(l, x, rows[i]);
+        for (int l = level; l >= 0 && rows[i].empty(); --l)
+            basis_.evaluate(l, x, rows[i]);
         if (rows[i].empty()) basis_.evaluate_or_nearest(level, x, rows[i]);
     });
     for (std::size_t i = 0; i < missing.size(); ++i) {
@@ -59,16 +61,15 @@ PullOperator SenderRows::make_pull_operator() {
     std::vector<std::vector<std::uint32_t>> seen(levels()); // number of each patch's row on a level
     for (int l = 0; l < levels(); ++l) {
         seen[l].resize(patches.size());
-        parallel_for(count, [&](Index p) {
-            seen[l][p] = number(finest.center(patches[p]), l);
-        });
+        parallel_for(count, [&](Index p) { seen[l][p] = number(finest.center(patches[p]), l); });
         require(seen[l]);
     }
 
     std::vector<std::vector<BasisEntry>> rows(points.end(levels() - 1));
     for (int l = 0; l + 1 < levels(); ++l) {
         // Turned around: the patches in which each function of the level is seen.
-        std::vector<std::vector<std::pair<std::uint32_t, float>>> sees(points.end(l) - points.begin(l));
+        std::vector<std::vector<std::pair<std::uint32_t, float>>> sees(points.end(l)
+                                                                       - points.begin(l));
         for (std::uint32_t p = 0; p < patches.size(); ++p)
             for (const BasisEntry& entry : row(seen[l][p]))
                 if (entry.index >= points.begin(l))
@@ -88,10 +89,12 @@ PullOperator SenderRows::make_pull_operator() {
                 std::vector<BasisEntry>& children = rows[points.begin(l) + k];
                 for (const auto& [child, share] : sum)
                     if (share > 1e-3 * total) children.push_back({child, 0.0f});
-                std::sort(children.begin(), children.end(),
-                          [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
+                std::sort(
+                    children.begin(), children.end(),
+                    [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
                 total = 0.0;
-                for (const BasisEntry& child : children) total += sum[child.index];
+                for (const BasisEntry& child : children)
+                    total += sum[child.index];
                 for (BasisEntry& child : children)
                     child.value = static_cast<float>(sum[child.index] / total);
             }

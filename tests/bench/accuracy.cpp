@@ -86,7 +86,6 @@ void run_references(const Common& common) {
     }
 }
 
-
 struct MeasureOptions {
     PrecomputeOptions precompute;
     std::string json;
@@ -202,8 +201,8 @@ void run_measure(const Common& common, const MeasureOptions& options) {
             const double own = reference.irradiance.relative_error[static_cast<std::size_t>(l)];
             const double net = std::sqrt(std::max(0.0, m.rel_rmse * m.rel_rmse - own * own));
             std::printf("%-18s %5lld %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f\n", name.c_str(),
-                        static_cast<long long>(l + 1), 100 * m.rel_rmse, 100 * net,
-                        100 * m.rel_l1, 100 * m.bias, 100 * m.median, 100 * m.p95, 100 * m.p99);
+                        static_cast<long long>(l + 1), 100 * m.rel_rmse, 100 * net, 100 * m.rel_l1,
+                        100 * m.bias, 100 * m.median, 100 * m.p95, 100 * m.p99);
             lights.push_back({{"rel_rmse", m.rel_rmse},
                               {"rel_rmse_net", net},
                               {"rel_l1", m.rel_l1},
@@ -216,26 +215,26 @@ void run_measure(const Common& common, const MeasureOptions& options) {
         std::string file = name;
         std::replace(file.begin(), file.end(), ':', '_');
         file = (std::filesystem::path(common.reference.cache) / (file + ".safetensors")).string();
-        save_transfer(file, transfer, {.version = AFTERGLOW_VERSION, .scene = described.path,
-                                       .scene_hash = scene.content_hash()});
+        save_transfer(file, transfer,
+                      {.version = AFTERGLOW_VERSION,
+                       .scene = described.path,
+                       .scene_hash = scene.content_hash()});
         const std::uint64_t bytes = std::filesystem::file_size(file);
-        std::printf("%s: %zu points, %lld uncovered, %.1f s (points %.1f push %.1f gather %.1f rows "
-                    "%.1f links %.1f), %.0fM rays, %u receivers, %u senders, %.2fM links, %.1f MB\n",
-                    name.c_str(), reference.points.size(), static_cast<long long>(uncovered),
-                    report.total_seconds, report.points_seconds, report.push_seconds,
-                    report.links.trace_seconds, report.links.rows_seconds,
-                    report.links.links_seconds, 1e-6 * static_cast<double>(report.links.rays),
-                    transfer.points.size(), transfer.senders(),
-                    1e-6 * static_cast<double>(transfer.links.entries()),
-                    1e-6 * static_cast<double>(bytes));
-        Json entry = {{"scene", name},
-                      {"points", reference.points.size()},
-                      {"uncovered", uncovered},
-                      {"lights", lights},
-                      {"seconds", report.total_seconds},
-                      {"bytes", bytes}};
+        std::printf(
+            "%s: %zu points, %lld uncovered, %.1f s (points %.1f push %.1f gather %.1f rows "
+            "%.1f links %.1f), %.0fM rays, %u receivers, %u senders, %.2fM links, %.1f MB\n",
+            name.c_str(), reference.points.size(), static_cast<long long>(uncovered),
+            report.total_seconds, report.points_seconds, report.push_seconds,
+            report.links.trace_seconds, report.links.rows_seconds, report.links.links_seconds,
+            1e-6 * static_cast<double>(report.links.rays), transfer.points.size(),
+            transfer.senders(), 1e-6 * static_cast<double>(transfer.links.entries()),
+            1e-6 * static_cast<double>(bytes));
+        Json entry = {
+            {"scene", name},    {"points", reference.points.size()}, {"uncovered", uncovered},
+            {"lights", lights}, {"seconds", report.total_seconds},   {"bytes", bytes}};
         if (options.time_rays) {
-            const double alone = gather_rays_alone(surface, transfer.points, options.precompute.links);
+            const double alone =
+                gather_rays_alone(surface, transfer.points, options.precompute.links);
             std::printf("%s: the same gather rays alone %.1f s, ray ratio %.2f\n", name.c_str(),
                         alone, report.total_seconds / alone);
             entry["rays_alone_seconds"] = alone;

@@ -22,7 +22,7 @@ std::size_t largest_allocation() {
 
 } // namespace afterglow
 
-// The other forms of new and delete call these two.
+// The other forms of new and delete call these; under AddressSanitizer, the nothrow form would not.
 void* operator new(std::size_t size) {
     std::size_t seen = largest;
     while (size > seen && !largest.compare_exchange_weak(seen, size)) {
@@ -31,9 +31,20 @@ void* operator new(std::size_t size) {
     throw std::bad_alloc();
 }
 
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+    try {
+        return operator new(size);
+    } catch (const std::bad_alloc&) {
+        return nullptr;
+    }
+}
+
 void operator delete(void* memory) noexcept {
     std::free(memory);
 }
 void operator delete(void* memory, std::size_t) noexcept {
+    std::free(memory);
+}
+void operator delete(void* memory, const std::nothrow_t&) noexcept {
     std::free(memory);
 }
