@@ -28,6 +28,10 @@ struct PointHierarchy {
     std::uint32_t size() const { return level_begin.back(); }
     std::uint32_t begin(int level) const { return level_begin[level]; }
     std::uint32_t end(int level) const { return level_begin[level + 1]; }
+    /// Whether a level is the last, which is displayed, or predicts it, through others or itself.
+    bool leads_to_display(int level) const {
+        return level <= parent_level.back() || level + 1 == levels();
+    }
     SurfacePoint point(Index i) const { return {position.col(i), normal.col(i)}; }
 };
 

@@ -210,7 +210,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     };
     for (int l = 0; l < points.levels(); ++l) {
         statistics.links.push_back(0);
-        if (l > points.parent_level[display] && l != display) continue; // senders alone
+        if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
         // A pushed link an eighth of the children's threshold decides nothing there.
         const int children = l == points.parent_level[display] ? display : l + 1;

@@ -26,8 +26,8 @@ struct LinkOptions {
     float footprint_angle = 0.02f; // see Footprint
     /// A link d of a receiver on level l is kept where |d| R_l^3 > threshold R_L^3 (R_L: spacing of
     /// the display level). The few coarse receivers are exact, at the price of few links: what they
-    /// lose, all finer ones lose in the same direction, as bias. What is dropped of the coarsest senders goes onto those that stay,
-    /// so that the response to uniform light stays exact.
+    /// lose, all finer ones lose in the same direction, as bias. What is dropped of the coarsest
+    /// senders goes onto those that stay, so that the response to uniform light stays exact.
     float threshold = 2e-2f;
     std::uint64_t seed = 1;
 };

@@ -15,8 +15,8 @@ namespace afterglow {
 inline constexpr int most_bounces = 1000; // that may be asked for by number
 
 /// All that a transfer file holds: the basis and the one-bounce operator over it. Senders are the
-/// points of the first `sender_levels` levels; receivers are those of the display level, the last,
-/// and of its parent level and above.
+/// points of the first `sender_levels` levels; receivers are those of the levels that lead to
+/// display.
 struct TransferOperator {
     PointHierarchy points;
     int sender_levels = 0;
@@ -27,9 +27,6 @@ struct TransferOperator {
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
     int display_level() const { return points.levels() - 1; }
-    bool receives(int level) const {
-        return level == display_level() || level <= points.parent_level.back();
-    }
 };
 
 /// Three numbers (R, G, B) a sender point: its radiosity [W/m^2].

@@ -136,7 +136,7 @@ double gather_rays_alone(const Surface& surface, const PointHierarchy& points,
                          const LinkOptions& options) {
     double seconds = 0.0;
     for (int l = 0; l < points.levels(); ++l) {
-        if (l > points.parent_level.back() && l + 1 < points.levels()) continue;
+        if (!points.leads_to_display(l)) continue;
         const GatherDirections directions = gather_directions(options, points, l);
         const int rays = directions.rays();
         constexpr Index at_once = 256; // points whose rays are made before the clock runs

@@ -1,6 +1,7 @@
 #include "core/builtin_scenes.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "tests/support/small_transfer.h"
 #include "transport/precompute.h"
 
 #include <gtest/gtest.h>
@@ -12,11 +13,8 @@ namespace afterglow {
 namespace {
 
 PrecomputeOptions quick() {
-    PrecomputeOptions options;
+    PrecomputeOptions options = small_options();
     options.coarse_radius = 0.2f;
-    options.receiver_levels = 3;
-    options.sender_levels = 2;
-    options.links.rays = 64;
     return options;
 }
 

@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "tests/support/file_error.h"
 #include "tests/support/temporary_folder.h"
 #include "transport/safetensors.h"
 
@@ -42,15 +43,6 @@ template <class T>
 std::vector<T> values(const SafetensorsFile& file, const std::string& name, TensorShape shape) {
     const auto span = file.tensor<T>(name, shape);
     return {span.begin(), span.end()};
-}
-
-std::string message_of(const std::function<void()>& action) {
-    try {
-        action();
-    } catch (const FileError& error) {
-        return error.what();
-    }
-    return "no FileError";
 }
 
 TEST(Safetensors, RoundTripKeepsEveryTypeAndString) {

@@ -1,6 +1,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
+#include "tests/support/file_error.h"
 #include "tests/support/small_transfer.h"
 #include "tests/support/temporary_folder.h"
 
@@ -17,15 +18,6 @@ std::string saved(const TransferOperator& transfer, const TransferProvenance& pr
     const TemporaryFolder folder;
     save_transfer(folder.path("t"), transfer, provenance);
     return content_of(folder.path("t"));
-}
-
-std::string message_of(const std::function<void()>& action) {
-    try {
-        action();
-    } catch (const FileError& error) {
-        return error.what();
-    }
-    return "no FileError";
 }
 
 const Spotlight lamp{Vec3(0.278f, 0.54f, 0.28f), -Vec3::UnitY(), 25.0f, 35.0f, Rgb(1, 0.5f, 2)};
