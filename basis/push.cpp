@@ -11,15 +11,15 @@ namespace {
 constexpr int most_channels = 9;
 
 /// values_i += sign * sum_k weight_ik values_k for the points of one level.
-void add_prediction(const SparseRows<float>& parents, Index begin, Index end, int channels, float sign,
-                    std::span<float> values) {
+void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int channels, float sign,
+                  std::span<float> values) {
     parallel_for(
         end - begin,
         [&](Index k) {
             const Index i = begin + k;
             std::array<float, most_channels> sum{};
-            const auto index = parents.indices(i);
-            const auto weight = parents.values(i);
+            const auto index = rows.indices(i);
+            const auto weight = rows.values(i);
             for (std::size_t e = 0; e < index.size(); ++e) {
                 const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
                 for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
@@ -35,13 +35,13 @@ void add_prediction(const SparseRows<float>& parents, Index begin, Index end, in
 void PushOperator::push(const PointHierarchy& points, int levels, int channels,
                         std::span<float> values) const {
     for (int l = 1; l < levels; ++l)
-        add_prediction(parents, points.begin(l), points.end(l), channels, 1.0f, values);
+        add_weighted(parents, points.begin(l), points.end(l), channels, 1.0f, values);
 }
 
 void PushOperator::difference(const PointHierarchy& points, int levels, int channels,
                               std::span<float> values) const {
     for (int l = levels - 1; l > 0; --l)
-        add_prediction(parents, points.begin(l), points.end(l), channels, -1.0f, values);
+        add_weighted(parents, points.begin(l), points.end(l), channels, -1.0f, values);
 }
 
 PushOperator make_push_operator(const ShepardBasis& basis) {
@@ -73,6 +73,12 @@ void PullOperator::pull(const PointHierarchy& points, int levels, int channels,
                 std::copy_n(sum.begin(), channels, &values[static_cast<std::size_t>(i) * channels]);
             },
             256);
+}
+
+void PullOperator::update(const PointHierarchy& points, int levels, int channels,
+                          std::span<float> coefficients) const {
+    for (int l = levels - 2; l >= 0; --l)
+        add_weighted(children, points.begin(l), points.end(l), channels, 1.0f, coefficients);
 }
 
 } // namespace afterglow

@@ -45,6 +45,17 @@ struct PullOperator {
 
     /// For the levels [0, levels), in place; `channels` numbers a point.
     void pull(const PointHierarchy& points, int levels, int channels, std::span<float> values) const;
+
+    /// The *update* step of the lifting scheme (Sweldens 1998), where push's difference is the
+    /// predict step: coefficients, in place, from fine to coarse,
+    ///
+    ///     c_k += sum_c <B_k, B_c> / <B_k, 1> c_c.
+    ///
+    /// What finer coefficients still hold in the mean is the coarser level's. A functional
+    /// sum_i t_i c_i of the coefficients before is sum_i d_i c_i of those after, where d is t less
+    /// the share of the coarser t:  d_c = t_c - sum_k t_k <B_k, B_c> / <B_k, 1>.
+    void update(const PointHierarchy& points, int levels, int channels,
+                std::span<float> coefficients) const;
 };
 
 } // namespace afterglow

@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -52,5 +54,36 @@ T parallel_sum(Index count, T zero, const Term& term, Index grain = 256) {
     for (const T& p : partial) total += p;
     return total;
 }
+
+/// Scratch objects that are costly to make: each body of a parallel loop borrows one, and there are
+/// as many as bodies that ran at the same time. They come back as they were left.
+template <class T>
+class ScratchPool {
+public:
+    explicit ScratchPool(std::function<std::unique_ptr<T>()> make) : make_(std::move(make)) {}
+
+    /// Returned to the pool when it goes out of scope.
+    auto borrow() {
+        std::unique_ptr<T> object;
+        {
+            const std::lock_guard lock(mutex_);
+            if (!free_.empty()) {
+                object = std::move(free_.back());
+                free_.pop_back();
+            }
+        }
+        if (!object) object = make_();
+        const auto give_back = [this](T* returned) {
+            const std::lock_guard lock(mutex_);
+            free_.emplace_back(returned);
+        };
+        return std::unique_ptr<T, decltype(give_back)>(object.release(), give_back);
+    }
+
+private:
+    std::function<std::unique_ptr<T>()> make_;
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<T>> free_;
+};
 
 } // namespace afterglow

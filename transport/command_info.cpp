@@ -20,8 +20,7 @@ struct InfoCommand {
 };
 
 std::uint64_t links_of_level(const TransferOperator& transfer, int level) {
-    const auto& begin = transfer.links.begin;
-    return begin[transfer.points.end(level)] - begin[transfer.points.begin(level)];
+    return transfer.links.count(transfer.points.begin(level), transfer.points.end(level));
 }
 
 Json info_json(const TransferFile& file) {
@@ -41,7 +40,7 @@ Json info_json(const TransferFile& file) {
             {"receivers", transfer.points.size()},
             {"senders", transfer.senders()},
             {"bounces", transfer.bounces},
-            {"links", transfer.links.entries()},
+            {"links", transfer.links.count(0, transfer.links.rows())},
             {"levels", levels},
             {"bytes", bytes},
             {"options", Json::parse(file.provenance.options)},

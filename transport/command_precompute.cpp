@@ -79,7 +79,7 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
             {"mean_ray_length", report.mean_ray_length},
             {"levels", levels},
             {"senders", transfer.senders()},
-            {"links", transfer.links.entries()},
+            {"links", transfer.links.count(0, transfer.links.rows())},
             {"links_before", report.links.links_before},
             {"rays_of_points", report.points_rays},
             {"rays_of_links", report.links.rays},
@@ -92,6 +92,7 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
             {"tree", outer.tree},
             {"points", report.points_seconds},
             {"push", report.push_seconds},
+            {"pull", report.pull_seconds},
             {"gather", report.links.trace_seconds},
             {"rows", report.links.rows_seconds},
             {"links", report.links.links_seconds},
@@ -115,7 +116,7 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
     }
     say("%s: %.1f MB, %.3g links of %.3g, %.3g rays, %s\n", command.output.c_str(),
         static_cast<double>(std::filesystem::file_size(command.output)) * 1e-6,
-        static_cast<double>(transfer.links.entries()),
+        static_cast<double>(transfer.links.count(0, transfer.links.rows())),
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
         duration_text(outer.total).c_str());

@@ -46,39 +46,70 @@ void GatherDirections::deal(Index receiver, Eigen::Matrix3Xf& directions) const 
     }
 }
 
-void trace_gather(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
-                  Index begin, Index end, Index first_receiver, const GatherDirections& directions,
-                  const Footprint& footprint, std::vector<GatherSample>& samples) {
-    const int rays = directions.rays();
-    samples.resize(static_cast<std::size_t>(end - begin) * rays);
+namespace {
+
+/// Traces the rays of the points [begin, end) and calls visit(r, local, rays, hits) for point
+/// begin + r.
+template <class Visit>
+void trace(const Surface& surface, const PointHierarchy& points, Index begin, Index end,
+           Index first_receiver, const GatherDirections& directions, const Visit& visit) {
     parallel_ranges(end - begin, 16, [&](Index first, Index last) {
         Eigen::Matrix3Xf local;
-        std::vector<Ray> ray(rays);
-        std::vector<Hit> hit(rays);
+        std::vector<Ray> rays(directions.rays());
+        std::vector<Hit> hits(directions.rays());
         for (Index r = first; r < last; ++r) {
             const SurfacePoint x = points.point(begin + r);
             const Frame frame(x.normal);
             const Vec3 origin = surface.lifted(x);
             directions.deal(begin + r - first_receiver, local);
-            for (int k = 0; k < rays; ++k) ray[k] = {origin, frame.to_world(local.col(k))};
-            surface.closest_hits(ray, hit);
-            GatherSample* sample = &samples[static_cast<std::size_t>(r) * rays];
-            for (int k = 0; k < rays; ++k) {
-                const float pdf = vector_irradiance_pdf(local(2, k));
-                sample[k].weight = ray[k].direction / (static_cast<float>(EIGEN_PI) * pdf * rays);
-                sample[k].finer_share = 0.0f;
-                sample[k].row = sample[k].finer_row = no_index;
-                if (!hit[k]) continue;
-                if (k % 4 == 0) rows.count(hit[k]);
-                const float at = footprint.level(hit[k]);
-                const int level = static_cast<int>(at);
-                sample[k].row = rows.number(hit[k], level);
-                if (at == static_cast<float>(level)) continue;
-                sample[k].finer_share = at - static_cast<float>(level);
-                sample[k].finer_row = rows.number(hit[k], level + 1);
-            }
+            for (int k = 0; k < directions.rays(); ++k)
+                rays[k] = {origin, frame.to_world(local.col(k))};
+            surface.closest_hits(rays, hits);
+            visit(r, local, rays, hits);
         }
     });
+}
+
+} // namespace
+
+void count_arrivals(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
+                    std::uint64_t seed) {
+    constexpr int rays = 32;
+    for (int l = 0; l < points.levels(); ++l)
+        if (points.leads_to_display(l))
+            trace(surface, points, points.begin(l), points.end(l), points.begin(l),
+                  GatherDirections(rays, hash64(seed, 0xa4400 + static_cast<std::uint64_t>(l))),
+                  [&](Index, const Eigen::Matrix3Xf&, const std::vector<Ray>&,
+                      const std::vector<Hit>& hits) {
+                      for (const Hit& hit : hits)
+                          if (hit) rows.count(hit);
+                  });
+}
+
+void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
+                  Index begin, Index end, Index first_receiver, const GatherDirections& directions,
+                  const Footprint& footprint, std::vector<GatherSample>& samples) {
+    const int count = directions.rays();
+    samples.resize(static_cast<std::size_t>(end - begin) * count);
+    trace(surface, points, begin, end, first_receiver, directions,
+          [&](Index r, const Eigen::Matrix3Xf& local, const std::vector<Ray>& rays,
+              const std::vector<Hit>& hits) {
+              GatherSample* sample = &samples[static_cast<std::size_t>(r) * count];
+              for (int k = 0; k < count; ++k) {
+                  const float pdf = vector_irradiance_pdf(local(2, k));
+                  sample[k].weight =
+                      rays[k].direction / (static_cast<float>(EIGEN_PI) * pdf * count);
+                  sample[k].finer_share = 0.0f;
+                  sample[k].row = sample[k].finer_row = no_index;
+                  if (!hits[k]) continue;
+                  const float at = footprint.level(hits[k]);
+                  const int level = static_cast<int>(at);
+                  sample[k].row = rows.number(hits[k], level);
+                  if (at == static_cast<float>(level)) continue;
+                  sample[k].finer_share = at - static_cast<float>(level);
+                  sample[k].finer_row = rows.number(hits[k], level + 1);
+              }
+          });
 }
 
 } // namespace afterglow

@@ -55,9 +55,13 @@ private:
     std::array<std::uint32_t, 2> shift_;
 };
 
-/// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k]. A quarter of
-/// them is counted in `rows`.
-void trace_gather(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
+/// Counts in `rows` where light arrives from, for SenderRows::make_pull_operator: the ends of 32
+/// rays of every receiver.
+void count_arrivals(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
+                    std::uint64_t seed);
+
+/// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k].
+void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
                   Index begin, Index end, Index first_receiver, const GatherDirections& directions,
                   const Footprint& footprint, std::vector<GatherSample>& samples);
 

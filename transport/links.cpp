@@ -7,15 +7,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
+#include <memory>
 
 namespace afterglow {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using LinkEntry = SparseEntry<LinkValue>;
-using LinkVector = Eigen::Vector4f; // x, y, z and a lane that stays zero
-
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -27,13 +24,9 @@ struct PushedRow {
     std::vector<LinkVector> value;
 };
 
-LinkVector to_float(const LinkValue& v) {
-    return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2]), 0.0f};
-}
-
 /// Thresholds of one receiver level, on the size of a link.
 struct LevelThresholds {
-    float kept; // what a link must exceed to be stored
+    std::vector<float> kept; // a sender level: what a link must exceed to be stored
     bool has_children;
     float negligible; // what a pushed link must exceed to be predicted for the children
 };
@@ -41,22 +34,27 @@ struct LevelThresholds {
 /// What a thread needs to turn samples into the row of a receiver.
 class RowMaker {
 public:
-    RowMaker(const PointHierarchy& points, const PushOperator& push, const SenderRows& rows)
-        : points_(points), push_(push), rows_(rows), sender_levels_(rows.levels()),
+    RowMaker(const PointHierarchy& points, const PushOperator& push, const PullOperator& pull,
+             const SenderRows& rows)
+        : points_(points), push_(push), pull_(pull), rows_(rows), sender_levels_(rows.levels()),
           link_(points.end(rows.levels() - 1), LinkVector::Zero()),
           predicted_(points.end(rows.levels() - 1), LinkVector::Zero()) {}
 
     /// Fills `kept` with the links of receiver i that are stored, and `pushed` where there are
-    /// children. `parents`: the pushed rows of the level above, its first point first.
-    void make(Index i, int level, std::span<const GatherSample> samples,
-              std::span<const PushedRow> parents, const LevelThresholds& thresholds,
-              std::vector<LinkEntry>& kept, PushedRow& pushed, std::uint64_t& links_before) {
+    /// children. `parents`: the pushed rows of the level above, its first point first. Returns how
+    /// many were stored, and adds how many there were to `links_before`.
+    std::uint64_t make(Index i, int level, std::span<const GatherSample> samples,
+                       std::span<const PushedRow> parents, const LevelThresholds& thresholds,
+                       std::vector<PackedLink>& kept, PushedRow& pushed,
+                       std::uint64_t& links_before) {
         gather(samples);
+        difference_senders(thresholds.kept[0]);
         if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
-        threshold(level, thresholds.kept, kept, links_before);
-        if (thresholds.has_children) push_down(kept, thresholds.negligible, pushed);
+        const std::uint64_t stored = threshold(level, thresholds.kept, kept, links_before);
+        if (thresholds.has_children) push_down(thresholds.negligible, pushed);
         link_.clear();
         predicted_.clear();
+        return stored;
     }
 
 private:
@@ -97,6 +95,20 @@ private:
                            });
     }
 
+    /// From coefficients to updated coefficients, see PullOperator::update. Links this small have no
+    /// children that are kept.
+    void difference_senders(float negligible) {
+        for (int l = sender_levels_ - 1; l > 0; --l)
+            link_.for_each(points_.begin(l - 1), points_.end(l - 1),
+                           [&](std::uint32_t k, const LinkVector& value) {
+                               if (value.squaredNorm() <= negligible * negligible) return;
+                               const auto index = pull_.children.indices(k);
+                               const auto share = pull_.children.values(k);
+                               for (std::size_t e = 0; e < index.size(); ++e)
+                                   link_.at(index[e]) -= share[e] * value;
+                           });
+    }
+
     /// Subtracts what the parents predict.
     void subtract_prediction(Index i, std::uint32_t first_parent,
                              std::span<const PushedRow> parents) {
@@ -112,54 +124,51 @@ private:
             [&](std::uint32_t j, const LinkVector& value) { link_.at(j) -= value; });
     }
 
-    /// Moves to `kept` what is stored of link_.
-    void threshold(int level, float smallest, std::vector<LinkEntry>& kept,
-                   std::uint64_t& links_before) {
-        const std::uint32_t coarsest = points_.end(0), all = points_.end(sender_levels_ - 1);
-        // The coarsest senders: what is dropped of them goes onto those that stay, in proportion to
-        // their size; more stay, the largest first, until what is dropped is itself small.
-        candidates_.clear();
-        LinkVector dropped = LinkVector::Zero();
-        link_.for_each(0, coarsest, [&](std::uint32_t j, const LinkVector& d) {
-            const float size = d.norm();
-            if (size == 0.0f) return;
-            candidates_.push_back({size, j});
-            dropped += d;
+    /// Moves to `kept` what is stored of link_, and adds it to predicted_.
+    std::uint64_t threshold(int level, const std::vector<float>& smallest,
+                            std::vector<PackedLink>& kept, std::uint64_t& links_before) {
+        std::uint64_t stored = 0;
+        const auto store = [&](std::uint32_t j, const LinkVector& d) {
+            const LinkVector value = packer_.append(j, d, kept);
+            if (value.isZero(0.0f)) return;
+            predicted_.at(j) += value;
+            ++stored;
+        };
+        // The coarsest senders: what is dropped goes onto those that stay, in proportion to their
+        // size. One stays, the largest, where all together are not small. The coarsest receivers
+        // keep all.
+        float largest = 0.0f;
+        LinkVector total = LinkVector::Zero();
+        link_.for_each(0, points_.end(0), [&](std::uint32_t, const LinkVector& d) {
+            links_before += !d.isZero(0.0f);
+            largest = std::max(largest, d.norm());
+            total += d;
         });
-        std::sort(candidates_.begin(), candidates_.end(),
-                  [](const Candidate& a, const Candidate& b) {
-                      return a.size != b.size ? a.size > b.size : a.sender < b.sender;
-                  });
-        std::size_t stay = 0;
+        float limit = level == 0 ? 0.0f : smallest[0];
+        if (largest <= limit && total.norm() > limit) limit = std::nextafter(largest, 0.0f);
         float stay_size = 0.0f;
-        while (stay < candidates_.size()
-               && (level == 0 || candidates_[stay].size > smallest || dropped.norm() > smallest)) {
-            dropped -= link_.at(candidates_[stay].sender);
-            stay_size += candidates_[stay++].size;
-        }
-        candidates_.resize(stay);
-        std::sort(candidates_.begin(), candidates_.end(),
-                  [](const Candidate& a, const Candidate& b) { return a.sender < b.sender; });
-        for (const Candidate& c : candidates_)
-            store(c.sender, link_.at(c.sender) + (c.size / stay_size) * dropped, kept);
-
-        link_.for_each(0, all, [&](std::uint32_t j, const LinkVector& d) {
-            const float size2 = d.squaredNorm();
-            if (size2 == 0.0f) return;
-            ++links_before;
-            if (j >= coarsest && size2 > smallest * smallest) store(j, d, kept);
+        LinkVector dropped = LinkVector::Zero();
+        link_.for_each(0, points_.end(0), [&](std::uint32_t, const LinkVector& d) {
+            if (d.norm() > limit) stay_size += d.norm();
+            else dropped += d;
         });
+        link_.for_each(0, points_.end(0), [&](std::uint32_t j, const LinkVector& d) {
+            if (d.norm() > limit) store(j, d + (d.norm() / stay_size) * dropped);
+        });
+
+        for (int k = 1; k < sender_levels_; ++k)
+            link_.for_each(points_.begin(k), points_.end(k),
+                           [&](std::uint32_t j, const LinkVector& d) {
+                               const float size2 = d.squaredNorm();
+                               links_before += size2 > 0.0f;
+                               if (size2 > smallest[k] * smallest[k]) store(j, d);
+                           });
+        return stored;
     }
 
-    static void store(std::uint32_t sender, const LinkVector& d, std::vector<LinkEntry>& kept) {
-        kept.push_back({sender, {Eigen::half(d.x()), Eigen::half(d.y()), Eigen::half(d.z())}});
-    }
-
-    /// Prediction and stored links together. Links to the coarsest senders all stay, so that the
-    /// response to uniform light is exact on every level.
-    void push_down(const std::vector<LinkEntry>& kept, float negligible, PushedRow& pushed) {
-        for (const LinkEntry& link : kept)
-            predicted_.at(link.index) += to_float(link.value);
+    /// Prediction and stored links together, less what is small. Links to the coarsest senders all
+    /// stay, so that the response to uniform light is exact on every level.
+    void push_down(float negligible, PushedRow& pushed) {
         const std::uint32_t coarsest = points_.end(0);
         predicted_.for_each(
             0, points_.end(sender_levels_ - 1), [&](std::uint32_t j, const LinkVector& value) {
@@ -172,16 +181,45 @@ private:
 
     const PointHierarchy& points_;
     const PushOperator& push_;
+    const PullOperator& pull_;
     const SenderRows& rows_;
     int sender_levels_;
     Accumulator<LinkVector> link_;
     Accumulator<LinkVector> predicted_;
-    struct Candidate {
-        float size;
-        std::uint32_t sender;
-    };
-    std::vector<Candidate> candidates_;
+    LinkPacker packer_;
 };
+
+LevelThresholds level_thresholds(const LinkOptions& options, const PointHierarchy& points,
+                                 int sender_levels, int level) {
+    const auto receiver = [&](int l) {
+        const float finer = points.spacing.back() / points.spacing[l];
+        return options.threshold * finer * finer;
+    };
+    LevelThresholds thresholds{{}, level != points.levels() - 1, 0.0f};
+    for (int k = 0; k < sender_levels; ++k)
+        thresholds.kept.push_back(receiver(level) * std::sqrt(points.spacing[0] / points.spacing[k]));
+    if (thresholds.has_children) {
+        // A pushed link an eighth of the children's threshold decides nothing there.
+        const int display = points.levels() - 1;
+        thresholds.negligible =
+            0.125f * receiver(level == points.parent_level[display] ? display : level + 1);
+    }
+    return thresholds;
+}
+
+/// Joins the rows; they are freed on the way.
+Links join(std::vector<std::vector<PackedLink>> rows) {
+    std::vector<std::uint64_t> begin{0};
+    for (const auto& row : rows)
+        begin.push_back(begin.back() + row.size());
+    std::vector<PackedLink> entry;
+    entry.reserve(begin.back());
+    for (auto& row : rows) {
+        entry.insert(entry.end(), row.begin(), row.end());
+        std::vector<PackedLink>().swap(row);
+    }
+    return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
+}
 
 } // namespace
 
@@ -189,37 +227,35 @@ GatherDirections gather_directions(const LinkOptions& options, const PointHierar
                                    int level) {
     const int coarser =
         static_cast<int>(std::lround(std::log2(points.spacing[level] / points.spacing.back())));
-    const std::int64_t rays = static_cast<std::int64_t>(options.rays) << std::max(0, coarser);
+    const std::int64_t rays = static_cast<std::int64_t>(options.rays) << 2 * std::max(0, coarser);
     return {
         static_cast<int>(std::min<std::int64_t>(std::max(options.most_rays, options.rays), rays)),
         hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
 
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
-                 SenderRows& rows, const LinkOptions& options, LinkStatistics& statistics) {
+                 const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
+                 LinkStatistics& statistics) {
     constexpr Index samples_at_once = 1 << 20, grain = 16;
-    std::vector<std::vector<LinkEntry>> done(points.size());
+    std::vector<std::vector<PackedLink>> done(points.size());
     std::vector<PushedRow> parents, pushed;
     std::vector<GatherSample> samples;
     std::vector<std::uint32_t> needed;
+    ScratchPool<RowMaker> makers(
+        [&] { return std::make_unique<RowMaker>(points, push, pull, rows); });
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
-    const int display = points.levels() - 1;
-    const auto kept_size = [&](int level) {
-        const float finer = points.spacing.back() / points.spacing[level];
-        return options.threshold * finer * finer * finer;
-    };
     for (int l = 0; l < points.levels(); ++l) {
         statistics.links.push_back(0);
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
-        // A pushed link an eighth of the children's threshold decides nothing there.
-        const int children = l == points.parent_level[display] ? display : l + 1;
-        const LevelThresholds thresholds{kept_size(l), l != display,
-                                         l == display ? 0.0f : 0.125f * kept_size(children)};
+        const LevelThresholds thresholds = level_thresholds(options, points, rows.levels(), l);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
-        std::vector<std::uint64_t> before(static_cast<std::size_t>((batch + grain - 1) / grain));
+        struct Count {
+            std::uint64_t before = 0, stored = 0;
+        };
+        std::vector<Count> counts(static_cast<std::size_t>((batch + grain - 1) / grain));
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
             auto start = Clock::now();
@@ -238,27 +274,28 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
             statistics.rows_seconds += seconds_since(start);
 
             start = Clock::now();
-            std::fill(before.begin(), before.end(), 0);
+            std::fill(counts.begin(), counts.end(), Count{});
             parallel_ranges(end - begin, grain, [&](Index first, Index last) {
-                RowMaker maker(points, push, rows);
+                const auto maker = makers.borrow();
+                Count& count = counts[first / grain];
                 for (Index r = first; r < last; ++r)
-                    maker.make(
+                    count.stored += maker->make(
                         begin + r, l,
                         std::span(samples).subspan(static_cast<std::size_t>(r) * directions.rays(),
                                                    static_cast<std::size_t>(directions.rays())),
                         parents, thresholds, done[begin + r], pushed[begin + r - points.begin(l)],
-                        before[first / grain]);
+                        count.before);
             });
-            for (const std::uint64_t b : before)
-                statistics.links_before += b;
+            for (const Count& count : counts) {
+                statistics.links_before += count.before;
+                statistics.links.back() += count.stored;
+            }
             statistics.links_seconds += seconds_since(start);
         }
-        for (Index i = points.begin(l); i < points.end(l); ++i)
-            statistics.links.back() += done[i].size();
     }
     statistics.patches = rows.made();
     statistics.uncovered_patches = rows.uncovered();
-    return join_rows(std::move(done));
+    return join(std::move(done));
 }
 
 } // namespace afterglow

@@ -16,8 +16,9 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// The finest sender spacing as a share of the typical ray length; the coarsest level follows.
-constexpr float finest_sender_share = 0.04f;
+/// The coarsest spacing as a share of the typical ray length: a few functions a room. With the
+/// default levels the finest senders are 1/25 of that length apart.
+constexpr float coarsest_share = 1.28f;
 
 } // namespace
 
@@ -51,7 +52,7 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     hierarchy.coarse_radius
         = options.coarse_radius > 0.0f
               ? options.coarse_radius
-              : std::ldexp(finest_sender_share * static_cast<float>(r.mean_ray_length), 3);
+              : coarsest_share * static_cast<float>(r.mean_ray_length);
     hierarchy.levels = std::max(options.receiver_levels - 1, options.sender_levels);
     hierarchy.display = {std::ldexp(hierarchy.coarse_radius, 1 - options.receiver_levels),
                          options.receiver_levels - 2, options.openness_density};
@@ -69,8 +70,12 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     SenderRows rows(surface, basis, options.sender_levels);
     LinkOptions links = options.links;
     links.seed = options.seed;
-    transfer.links = make_links(surface, transfer.points, transfer.push, rows, links, r.links);
+    const auto pull_start = Clock::now();
+    count_arrivals(surface, rows, transfer.points, options.seed);
     transfer.pull = rows.make_pull_operator();
+    r.pull_seconds = seconds_since(pull_start);
+    transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,
+                                r.links);
     r.total_seconds = seconds_since(start);
     return transfer;
 }

@@ -16,11 +16,11 @@ struct PrecomputeOptions {
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
     float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length
     /// Levels of receivers, spacing R, R/2, R/4 ...; the last is the display level.
-    int receiver_levels = 4;
+    int receiver_levels = 6;
     /// Levels of senders, spaced alike; they share the points of the receivers' levels but the
     /// display level's. Finer ones send what lands on them first, and hand on, for all further
     /// bounces, what the coarser ones receive.
-    int sender_levels = 3;
+    int sender_levels = 5;
     LinkOptions links;
     BasisShape shape;
     float openness_density = 0.1f; // of the display level, see DisplayLevel
@@ -30,7 +30,7 @@ struct PrecomputeOptions {
 
 /// Wall-clock seconds and counts of each stage, for --report.
 struct PrecomputeReport {
-    double points_seconds = 0.0, push_seconds = 0.0;
+    double points_seconds = 0.0, push_seconds = 0.0, pull_seconds = 0.0;
     std::vector<Vec3> viewpoints;
     double mean_ray_length = 0.0;
     HierarchyStatistics hierarchy;

@@ -37,7 +37,7 @@ public:
         __builtin_prefetch(entries_.data() + place_[number].begin);
         __builtin_prefetch(entries_.data() + place_[number].begin + 8);
     }
-    /// Counts a gather ray that ends here. May be called concurrently.
+    /// Counts a ray that ends here. May be called concurrently.
     void count(const Hit& hit) {
         std::atomic_ref(hits_[grid_.back().patch_of(hit)]).fetch_add(1, std::memory_order_relaxed);
     }

@@ -19,15 +19,10 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* format_name = "afterglow transfer";
-constexpr const char* format_version = "1";
+constexpr const char* format_version = "2";
 constexpr const char* operator_name = "neumann";
 
-static_assert(sizeof(LinkValue) == 3 * sizeof(Eigen::half), "links are mapped as rows of 3 halves");
-
-/// Sender indices are stored in 16 bits where all of them fit.
-bool has_short_indices(std::uint32_t senders) {
-    return senders <= 1u << 16;
-}
+static_assert(sizeof(PackedLink) == 3, "links are mapped as rows of three bytes");
 
 // The scene's path
 
@@ -238,36 +233,25 @@ private:
     }
 
     void read_links(TransferOperator& transfer) const {
-        const auto half = tensor<Eigen::half>("links.value", {any_extent, 3});
-        const std::uint64_t entries = half.size() / 3;
-        transfer.links.begin = read_begin("links.begin", transfer.points.size(), entries);
-        if (has_short_indices(transfer.senders())) {
-            const auto index = tensor<std::uint16_t>("links.sender", {entries});
-            check_links(transfer, index);
-            std::vector<std::uint32_t> wide(entries);
-            parallel_ranges(static_cast<Index>(entries), 1 << 16, [&](Index from, Index to) {
-                std::copy(index.begin() + from, index.begin() + to, wide.begin() + from);
-            });
-            transfer.links.index = SharedArray(std::move(wide));
-        } else {
-            const auto index = tensor<std::uint32_t>("links.sender", {entries});
-            check_links(transfer, index);
-            transfer.links.index = shared(index);
-        }
-        parallel_ranges(static_cast<Index>(half.size()), 1 << 16, [&](Index from, Index to) {
-            bool finite = true;
-            for (Index k = from; k < to; ++k)
-                finite &= (half[k].x & 0x7c00) != 0x7c00; // all ones: infinite or NaN
-            if (!finite) fail("has a link that is not finite");
+        Links& links = transfer.links;
+        const auto bytes = tensor<std::uint8_t>("links.packed", {any_extent, sizeof(PackedLink)});
+        const std::uint64_t entries = bytes.size() / sizeof(PackedLink);
+        links.begin = read_begin("links.begin", transfer.points.size(), entries);
+        links.entry = {{reinterpret_cast<const PackedLink*>(bytes.data()), entries}, file_.map()};
+        parallel_ranges(links.rows(), 1024, [&](Index from, Index to) {
+            bool good = true;
+            for (Index row = from; row < to; ++row) {
+                std::int64_t sender = -1;
+                for (const PackedLink& packed : links.row(row)) {
+                    const std::uint32_t bits = Links::bits_of(packed);
+                    const std::uint32_t step = bits >> 12 == 0 ? bits : bits & 127u;
+                    good &= step > 0;
+                    sender += step;
+                }
+                good &= sender < static_cast<std::int64_t>(transfer.senders());
+            }
+            if (!good) fail("has a row of links that does not rise or leaves the senders");
         });
-        transfer.links.value = {{reinterpret_cast<const LinkValue*>(half.data()), entries},
-                                file_.map()};
-    }
-
-    template <class T>
-    void check_links(const TransferOperator& transfer, std::span<const T> index) const {
-        check_rows("links.sender", transfer.links.begin, index, 0, transfer.points.size(), 0,
-                   transfer.senders());
     }
 
     void read_provenance(TransferProvenance& provenance) const {
@@ -315,14 +299,9 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
         return make_tensor(std::move(name), std::move(shape), values);
     };
 
-    std::vector<std::uint16_t> short_sender;
-    Tensor sender = make_tensor("links.sender", {links.entries()}, links.index.span());
-    if (has_short_indices(transfer.senders())) {
-        short_sender.assign(links.index.span().begin(), links.index.span().end());
-        sender = make_tensor<std::uint16_t>("links.sender", {links.entries()}, short_sender);
-    }
-    const std::span<const Eigen::half> halves{
-        reinterpret_cast<const Eigen::half*>(links.value.data()), 3 * links.entries()};
+    const std::span<const std::uint8_t> packed{
+        reinterpret_cast<const std::uint8_t*>(links.entry.data()),
+        sizeof(PackedLink) * links.entries()};
 
     const std::vector<Tensor> tensors = {
         floats("points.position", {count, 3}, values_of(points.position)),
@@ -338,8 +317,7 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
         make_tensor("pull.index", {pull.entries()}, pull.index.span()),
         make_tensor("pull.value", {pull.entries()}, pull.value.span()),
         make_tensor("links.begin", {count + 1}, links.begin.span()),
-        sender,
-        make_tensor("links.value", {links.entries(), 3}, halves)};
+        make_tensor("links.packed", {links.entries(), sizeof(PackedLink)}, packed)};
 
     write_safetensors(path, tensors,
                       {{"format", format_name},

@@ -28,6 +28,7 @@ std::vector<float> LightTransport::coefficients(const Radiosity& radiosity) cons
     std::vector<float> values(radiosity);
     transfer_.pull.pull(points, transfer_.sender_levels, 3, values);
     transfer_.push.difference(points, transfer_.sender_levels, 3, values);
+    transfer_.pull.update(points, transfer_.sender_levels, 3, values);
     std::vector<float> padded(4 * static_cast<std::size_t>(transfer_.senders()), 0.0f);
     for (std::size_t m = 0; m < transfer_.senders(); ++m) std::copy_n(&values[3 * m], 3, &padded[4 * m]);
     return padded;
@@ -42,14 +43,12 @@ VectorIrradiance LightTransport::apply_links(const std::vector<float>& coefficie
         [&](Index i) {
             using Eigen::Vector4f;
             Vector4f x = Vector4f::Zero(), y = Vector4f::Zero(), z = Vector4f::Zero();
-            const auto sender = transfer_.links.indices(i);
-            const auto value = transfer_.links.values(i);
-            for (std::size_t k = 0; k < sender.size(); ++k) {
-                const auto e = Vector4f::Map(&coefficients[4 * static_cast<std::size_t>(sender[k])]);
-                x += static_cast<float>(value[k][0]) * e;
-                y += static_cast<float>(value[k][1]) * e;
-                z += static_cast<float>(value[k][2]) * e;
-            }
+            transfer_.links.for_each(i, [&](std::uint32_t sender, const LinkVector& link) {
+                const auto e = Vector4f::Map(&coefficients[4 * static_cast<std::size_t>(sender)]);
+                x += link.x() * e;
+                y += link.y() * e;
+                z += link.z() * e;
+            });
             float* to = &field[9 * static_cast<std::size_t>(i)];
             std::copy_n(x.data(), 3, to);
             std::copy_n(y.data(), 3, to + 3);

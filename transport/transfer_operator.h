@@ -74,7 +74,7 @@ public:
 
 private:
     const TransferOperator& transfer_;
-    /// Pulled and differenced, four floats a sender (the last zero).
+    /// Pulled, differenced and updated, four floats a sender (the last zero).
     std::vector<float> coefficients(const Radiosity& radiosity) const;
     VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
 };

@@ -221,13 +221,15 @@ void run_measure(const Common& common, const MeasureOptions& options) {
                        .scene_hash = scene.content_hash()});
         const std::uint64_t bytes = std::filesystem::file_size(file);
         std::printf(
-            "%s: %zu points, %lld uncovered, %.1f s (points %.1f push %.1f gather %.1f rows "
+            "%s: %zu points, %lld uncovered, %.1f s (points %.1f push %.1f pull %.1f gather %.1f rows "
             "%.1f links %.1f), %.0fM rays, %u receivers, %u senders, %.2fM links, %.1f MB\n",
             name.c_str(), reference.points.size(), static_cast<long long>(uncovered),
             report.total_seconds, report.points_seconds, report.push_seconds,
+            report.pull_seconds,
             report.links.trace_seconds, report.links.rows_seconds, report.links.links_seconds,
             1e-6 * static_cast<double>(report.links.rays), transfer.points.size(),
-            transfer.senders(), 1e-6 * static_cast<double>(transfer.links.entries()),
+            transfer.senders(),
+            1e-6 * static_cast<double>(transfer.links.count(0, transfer.links.rows())),
             1e-6 * static_cast<double>(bytes));
         Json entry = {
             {"scene", name},    {"points", reference.points.size()}, {"uncovered", uncovered},

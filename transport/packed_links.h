@@ -1,0 +1,118 @@
+#pragma once
+
+#include "basis/sparse_rows.h"
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace afterglow {
+
+/// A link's x, y, z and a lane that is zero.
+using LinkVector = Eigen::Vector4f;
+
+/// Three bytes of a row of links: 24 bits, the lowest first.
+///
+///     0-6    step: sender less the sender before it in the row, which is -1 at the start
+///     7-11   exponent E
+///     12-23  x, y, z: four bits each, two's complement, -7 to 7
+///
+/// and the link is (x, y, z) 2^(E - 31). Where x, y and z are all zero the entry is a *jump*: bits
+/// 0-11 are a step, and there is no link. Links are sums over few rays: rounding to a fourteenth of
+/// the largest component is lost in their noise.
+using PackedLink = std::array<std::uint8_t, 3>;
+
+/// Writes the rows of links.
+class LinkPacker {
+public:
+    /// Appends a link to a row; senders must rise within it. Returns the value as it will be read,
+    /// which is zero, and nothing is appended, where the link is below 2^-32.
+    LinkVector append(std::uint32_t sender, const LinkVector& value, std::vector<PackedLink>& row) {
+        if (row.empty()) last_ = -1;
+        const float size = value.cwiseAbs().maxCoeff();
+        int exponent = 0;
+        std::frexp(size / (most + 0.5f), &exponent); // size < (most + 1/2) 2^exponent
+        exponent = std::clamp(exponent + 31, 0, 31);
+        const float step = step_of(static_cast<std::uint32_t>(exponent));
+        const LinkVector rounded =
+            (value / step).array().round().min(float{most}).max(-float{most});
+        if (rounded.isZero(0.0f)) return LinkVector::Zero();
+
+        std::int64_t distance = static_cast<std::int64_t>(sender) - last_;
+        for (; distance > longest_step; distance -= std::min<std::int64_t>(distance - 1, longest_jump))
+            push(static_cast<std::uint32_t>(std::min<std::int64_t>(distance - 1, longest_jump)), row);
+        std::uint32_t bits =
+            static_cast<std::uint32_t>(distance) | static_cast<std::uint32_t>(exponent) << 7;
+        for (int c = 0; c < 3; ++c)
+            bits |= (static_cast<std::uint32_t>(static_cast<int>(rounded[c])) & 15u) << (12 + 4 * c);
+        push(bits, row);
+        last_ = sender;
+        return rounded * step;
+    }
+
+    static float step_of(std::uint32_t exponent) {
+        return std::bit_cast<float>((exponent + 127 - 31) << 23);
+    }
+
+private:
+    static constexpr int most = 7;
+    static constexpr std::int64_t longest_step = 127, longest_jump = 4095;
+
+    static void push(std::uint32_t bits, std::vector<PackedLink>& row) {
+        row.push_back({static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
+                       static_cast<std::uint8_t>(bits >> 16)});
+    }
+
+    std::int64_t last_ = -1;
+};
+
+/// All links: a row a receiver.
+struct Links {
+    SharedArray<std::uint64_t> begin; // rows + 1: row i holds entry[begin[i] .. begin[i + 1])
+    SharedArray<PackedLink> entry;
+
+    Index rows() const { return static_cast<Index>(begin.size()) - 1; }
+    std::uint64_t entries() const { return entry.size(); }
+    std::span<const PackedLink> row(Index i) const {
+        return {entry.data() + begin[i], entry.data() + begin[i + 1]};
+    }
+
+    /// Links of the rows [first, last): entries that are not jumps.
+    std::uint64_t count(Index first, Index last) const {
+        return static_cast<std::uint64_t>(std::count_if(
+            entry.data() + begin[first], entry.data() + begin[last],
+            [](const PackedLink& packed) { return bits_of(packed) >> 12 != 0; }));
+    }
+
+    /// Calls visit(sender, LinkVector) for the links of a row, senders rising.
+    template <class Visit>
+    void for_each(Index i, const Visit& visit) const {
+        std::uint32_t sender = ~0u;
+        for (const PackedLink& packed : row(i)) {
+            const std::uint32_t bits = bits_of(packed);
+            if (bits >> 12 == 0) {
+                sender += bits;
+                continue;
+            }
+            sender += bits & 127u;
+            const auto component = [&](int c) {
+                return static_cast<float>(static_cast<std::int32_t>(bits << (16 - 4 * c)) >> 28);
+            };
+            visit(sender, LinkVector(component(0), component(1), component(2), 0.0f)
+                              * LinkPacker::step_of(bits >> 7 & 31u));
+        }
+    }
+
+    static std::uint32_t bits_of(const PackedLink& packed) {
+        return packed[0] | static_cast<std::uint32_t>(packed[1]) << 8
+               | static_cast<std::uint32_t>(packed[2]) << 16;
+    }
+};
+
+} // namespace afterglow
