@@ -37,15 +37,16 @@ Openness OpennessProbe::operator()(const SurfacePoint& x) const {
         surface_.closest_hits(std::span(rays).first(count), std::span(hits).first(count));
         for (int k = 0; k < count; ++k) {
             const float weight = 2.0f / (directions_(2, begin + k) + 0.5f);
-            for (int d = 0; d < 3; ++d) {
-                const float scale = spacing_ * (d == 0 ? 0.25f : d == 1 ? 1.0f : 4.0f);
-                const float open = hits[k] ? -std::expm1(-hits[k].distance / scale) : 1.0f;
-                sum.segment<3>(3 * d) += weight * open * rays[k].direction;
+            // exp(-t/D) for the longest D; the next, a quarter as long, has its fourth power.
+            float near = hits[k] ? std::exp(-hits[k].distance / (4.0f * spacing_)) : 0.0f;
+            for (int d = openness_distances - 1; d >= 0; --d) {
+                sum.segment<3>(3 * d) += weight * (1.0f - near) * rays[k].direction;
+                near = near * near * near * near;
             }
         }
     }
     sum /= static_cast<float>(directions_.cols());
-    for (int d = 0; d < 3; ++d) sum.segment<3>(3 * d) -= x.normal;
+    for (int d = 0; d < openness_distances; ++d) sum.segment<3>(3 * d) -= x.normal;
     return sum;
 }
 

@@ -7,13 +7,16 @@
 
 namespace afterglow {
 
-/// What a point sees of its near surroundings, at three distances D_k = R/4, R, 4R:
+inline constexpr int openness_distances = 4;
+
+/// What a point sees of its near surroundings, at four distances D_k = R/16, R/4, R, 4R:
 ///
 ///     F_k(x) = (1/pi) int_hemisphere omega (1 - exp(-t(omega)/D_k)) domega
 ///
 /// with t the distance to the first surface (infinite where there is none), so that F = n on open
-/// ground and shrinks or tilts beside an edge. Stored as F_k - n: nine numbers without a unit.
-using Openness = Eigen::Matrix<float, 9, 1>;
+/// ground and shrinks or tilts beside an edge. Stored as F_k - n: three numbers a distance,
+/// without a unit.
+using Openness = Eigen::Matrix<float, 3 * openness_distances, 1>;
 
 /// Estimates the feature with `rays` short rays of length 16 R, the same directions about every
 /// normal, so that equal surroundings give equal features to the last bit of noise.

@@ -150,7 +150,7 @@ private:
         std::array<Near, 128> near;
         int count = 0;
         for_each_near(cell, x, [&](const Dart& dart, float d) {
-            conflict = d < options_.spacing / 8.0f || count == static_cast<int>(near.size());
+            conflict = d < options_.spacing / 32.0f || count == static_cast<int>(near.size());
             if (!conflict) near[count++] = {&dart, d};
             return !conflict;
         });
@@ -188,8 +188,8 @@ PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& opti
         for (const char a : accepted) failures = a ? 0 : failures + 1;
         accepted_total += hits;
         next += round;
-        // Features cost rays: past this rate another dart changes little, and what remains is to
-        // leave no hole of size R.
+        // Features cost rays, and narrow contacts are met seldom: past this rate another dart changes
+        // little, and what remains is to leave no hole of size R.
         if (refining && hits * 12 < round) {
             refining = false;
             failures = 0;

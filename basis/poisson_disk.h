@@ -16,10 +16,10 @@ struct PoissonDiskOptions {
     /// Leave out narrow places, where the harmonic mean distance to what is around is below R/6
     /// [LZT08, sec. 2.3]; finer levels fill them.
     bool skip_narrow = false;
-    /// With a density s > 0, points may come as close as R/8 where the openness feature changes:
-    /// y conflicts with x if D < R/8, or if D exp(|dF|^2 / (2 s^2)) < R.
+    /// With a density s > 0, points may come as close as R/32 where the openness feature changes:
+    /// y conflicts with x if D < R/32, or if D exp(|dF|^2 / (2 s^2)) < R.
     float openness_density = 0.0f;
-    int openness_rays = 48;
+    int openness_rays = 24;
     std::size_t first_candidate = 0; // where in the source's sequence to begin
     int failures_to_end = 2000;      // the set is maximal once so many candidates failed in a row
 };

@@ -51,6 +51,7 @@ PushOperator make_push_operator(const ShepardBasis& basis) {
         parallel_for(points.end(l) - points.begin(l), [&](Index k) {
             const Index i = points.begin(l) + k;
             basis.evaluate_or_nearest(points.parent_level[l], points.point(i), rows[i]);
+            drop_small_shares(rows[i]);
         });
     return {join_rows(std::move(rows))};
 }

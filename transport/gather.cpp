@@ -48,6 +48,8 @@ void GatherDirections::deal(Index receiver, Eigen::Matrix3Xf& directions) const 
 
 namespace {
 
+constexpr std::uint32_t golden_ratio = 2654435769u; // its fraction of 2^32
+
 /// Traces the rays of the points [begin, end) and calls visit(r, local, rays, hits) for point
 /// begin + r.
 template <class Visit>
@@ -99,15 +101,14 @@ void trace_gather(const Surface& surface, const SenderRows& rows, const PointHie
                   const float pdf = vector_irradiance_pdf(local(2, k));
                   sample[k].weight =
                       rays[k].direction / (static_cast<float>(EIGEN_PI) * pdf * count);
-                  sample[k].finer_share = 0.0f;
-                  sample[k].row = sample[k].finer_row = no_index;
+                  sample[k].row = no_index;
                   if (!hits[k]) continue;
-                  const float at = footprint.level(hits[k]);
-                  const int level = static_cast<int>(at);
-                  sample[k].row = rows.number(hits[k], level);
-                  if (at == static_cast<float>(level)) continue;
-                  sample[k].finer_share = at - static_cast<float>(level);
-                  sample[k].finer_row = rows.number(hits[k], level + 1);
+                  const float level = footprint.level(hits[k]);
+                  const float coarser = std::floor(level);
+                  // Between two levels, one of them: a sequence of its own decides.
+                  const auto n = static_cast<std::uint32_t>((begin + r - first_receiver) * count + k);
+                  const bool finer = unit_float(n * golden_ratio) < level - coarser;
+                  sample[k].row = rows.number(hits[k], static_cast<int>(coarser) + finer);
               }
           });
 }

@@ -16,15 +16,15 @@
 namespace afterglow {
 
 /// One ray of a hemispherical gather and what it adds: `weight` times the field of the senders where
-/// it ends, read between two levels.
+/// it ends, as one sender level has it.
 struct GatherSample {
     Vec3 weight;       // omega / (pi pdf N): direction, no cosine
-    float finer_share; // of the finer row, in [0, 1]
-    std::uint32_t row, finer_row; // numbers of SenderRows; both no_index where the ray leaves the scene
+    std::uint32_t row; // number of SenderRows; no_index where the ray leaves the scene
 };
 
 /// Which sender level a ray looks at: the finest whose spacing R_l is at least
-/// angle * distance / max(cos, 0.3), as a mip map would be read, blended linearly in log R. The angle
+/// angle * distance / max(cos, 0.3), as a mip map would be read; between two levels a ray takes one, with
+/// probabilities linear in log R. The angle
 /// is a constant of the operator, not of the ray count, so that receivers and their parents resolve
 /// alike.
 struct Footprint {

@@ -58,31 +58,20 @@ public:
     }
 
 private:
-    void add(std::span<const BasisEntry> row, const LinkVector& weight) {
-        for (const BasisEntry& entry : row)
-            link_.at(entry.index) += entry.value * weight;
-    }
-
     /// Raw links: first to sender values, then, by the transpose of push, to sender coefficients.
     void gather(std::span<const GatherSample> samples) {
         constexpr std::size_t far = 16, near = 8;
         for (std::size_t k = 0; k < samples.size(); ++k) {
             // The rows lie scattered over memory: ask for them while others are added.
-            if (k + far < samples.size() && samples[k + far].row != no_index) {
+            if (k + far < samples.size() && samples[k + far].row != no_index)
                 rows_.prefetch_place(samples[k + far].row);
-                if (samples[k + far].finer_row != no_index)
-                    rows_.prefetch_place(samples[k + far].finer_row);
-            }
-            if (k + near < samples.size() && samples[k + near].row != no_index) {
+            if (k + near < samples.size() && samples[k + near].row != no_index)
                 rows_.prefetch_row(samples[k + near].row);
-                if (samples[k + near].finer_row != no_index)
-                    rows_.prefetch_row(samples[k + near].finer_row);
-            }
             const GatherSample& s = samples[k];
             if (s.row == no_index) continue;
             const LinkVector weight(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
-            add(rows_.row(s.row), (1.0f - s.finer_share) * weight);
-            if (s.finer_row != no_index) add(rows_.row(s.finer_row), s.finer_share * weight);
+            for (const BasisEntry& entry : rows_.row(s.row))
+                link_.at(entry.index) += entry.value * weight;
         }
         for (int l = sender_levels_ - 1; l > 0; --l)
             link_.for_each(points_.begin(l), points_.end(l),
@@ -191,16 +180,16 @@ private:
 
 LevelThresholds level_thresholds(const LinkOptions& options, const PointHierarchy& points,
                                  int sender_levels, int level) {
+    const int display = points.levels() - 1;
     const auto receiver = [&](int l) {
         const float finer = points.spacing.back() / points.spacing[l];
-        return options.threshold * finer * finer;
+        return options.threshold * (l == display ? 4.0f : finer * finer);
     };
-    LevelThresholds thresholds{{}, level != points.levels() - 1, 0.0f};
+    LevelThresholds thresholds{{}, level != display, 0.0f};
     for (int k = 0; k < sender_levels; ++k)
         thresholds.kept.push_back(receiver(level) * std::sqrt(points.spacing[0] / points.spacing[k]));
     if (thresholds.has_children) {
         // A pushed link an eighth of the children's threshold decides nothing there.
-        const int display = points.levels() - 1;
         thresholds.negligible =
             0.125f * receiver(level == points.parent_level[display] ? display : level + 1);
     }
@@ -225,12 +214,12 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
 
 GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,
                                    int level) {
-    const int coarser =
-        static_cast<int>(std::lround(std::log2(points.spacing[level] / points.spacing.back())));
-    const std::int64_t rays = static_cast<std::int64_t>(options.rays) << 2 * std::max(0, coarser);
-    return {
-        static_cast<int>(std::min<std::int64_t>(std::max(options.most_rays, options.rays), rays)),
-        hash64(options.seed, static_cast<std::uint64_t>(level))};
+    const float coarser = std::log2(points.spacing[level] / points.spacing.back());
+    const int doublings = static_cast<int>(1.5f * std::max(0.0f, coarser) + 0.01f);
+    int rays = options.rays;
+    for (int k = 0; k < doublings && rays < options.most_rays; ++k)
+        rays *= 2;
+    return {rays, hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
 
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
@@ -266,10 +255,8 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
 
             start = Clock::now();
             needed.clear();
-            for (const GatherSample& s : samples) {
+            for (const GatherSample& s : samples)
                 needed.push_back(s.row);
-                needed.push_back(s.finer_row);
-            }
             rows.require(needed);
             statistics.rows_seconds += seconds_since(start);
 

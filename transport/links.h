@@ -12,17 +12,20 @@ namespace afterglow {
 
 struct LinkOptions {
     int rays = 512; // of a receiver on the finest level; a power of two
-    /// A level up has four times as many rays, up to these: as many a surface area.
+    /// Coarser levels l have more, (R_l / R_L)^1.5 times as many rounded down to a power of two, until
+    /// there are these: their links must be less noisy as their thresholds are lower.
     int most_rays = 8192;
     float footprint_angle = 0.02f; // see Footprint
     /// A link d of a receiver on level l to a sender on level k is kept where
     ///
     ///     |d| (R_l / R_L)^2 (R_k / R_0)^(1/2) > threshold,   R_L: the display level's spacing.
     ///
-    /// Receivers: what a coarse one loses, all finer ones lose in the same direction, as bias.
+    /// and on the display level itself where |d| (R_k / R_0)^(1/2) > 4 threshold.
+    /// Receivers: what a coarse one loses, all finer ones lose in the same direction, as bias; what
+    /// the display level loses stays where it is, and its links are the noisiest.
     /// Senders: coefficients on level k are of shadow edges, which cross a share of the functions
     /// that goes like R_k, so that their root mean square goes like R_k^(1/2).
-    float threshold = 5e-3f;
+    float threshold = 3.2e-3f;
     std::uint64_t seed = 1;
 };
 

@@ -2,13 +2,13 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "transport/accumulator.h"
 
 #include <algorithm>
-#include <unordered_map>
+#include <memory>
 #include <utility>
 
 namespace afterglow {
-
 SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels,
                        float patch_share)
     : surface_(surface), basis_(basis) {
@@ -39,6 +39,7 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
         for (int l = level; l >= 0 && rows[i].empty(); --l)
             basis_.evaluate(l, x, rows[i]);
         if (rows[i].empty()) basis_.evaluate_or_nearest(level, x, rows[i]);
+        drop_small_shares(rows[i]);
     });
     for (std::size_t i = 0; i < missing.size(); ++i) {
         place_[missing[i]] = {static_cast<std::uint32_t>(entries_.size()),
@@ -75,28 +76,28 @@ PullOperator SenderRows::make_pull_operator() {
                 if (entry.index >= points.begin(l))
                     sees[entry.index - points.begin(l)].push_back(
                         {p, static_cast<float>(hits_[patches[p]]) * entry.value});
+        ScratchPool<Accumulator<double>> sums(
+            [&] { return std::make_unique<Accumulator<double>>(points.end(l + 1), 0.0); });
         parallel_ranges(static_cast<Index>(sees.size()), 64, [&](Index first, Index last) {
-            std::unordered_map<std::uint32_t, double> sum;
+            const auto sum = sums.borrow();
             for (Index k = first; k < last; ++k) {
-                sum.clear();
-                double total = 0.0;
+                double total = 0.0, kept = 0.0;
                 for (const auto& [p, weight] : sees[k])
                     for (const BasisEntry& child : row(seen[l + 1][p]))
                         if (child.index >= points.begin(l + 1)) {
-                            sum[child.index] += static_cast<double>(weight) * child.value;
-                            total += static_cast<double>(weight) * child.value;
+                            const double share = static_cast<double>(weight) * child.value;
+                            sum->at(child.index) += share;
+                            total += share;
                         }
                 std::vector<BasisEntry>& children = rows[points.begin(l) + k];
-                for (const auto& [child, share] : sum)
-                    if (share > 1e-3 * total) children.push_back({child, 0.0f});
-                std::sort(
-                    children.begin(), children.end(),
-                    [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
-                total = 0.0;
-                for (const BasisEntry& child : children)
-                    total += sum[child.index];
+                sum->for_each(0, points.end(l + 1), [&](std::uint32_t child, double share) {
+                    if (share <= 1e-3 * total) return;
+                    children.push_back({child, static_cast<float>(share)});
+                    kept += share;
+                });
                 for (BasisEntry& child : children)
-                    child.value = static_cast<float>(sum[child.index] / total);
+                    child.value = static_cast<float>(child.value / kept);
+                sum->clear();
             }
         });
     }

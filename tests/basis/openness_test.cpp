@@ -9,27 +9,28 @@
 namespace afterglow {
 namespace {
 
-constexpr float distances[] = {0.25f, 1.0f, 4.0f}; // D_k in units of R
+constexpr float distances[openness_distances] = {0.0625f, 0.25f, 1.0f, 4.0f}; // D_k in units of R
 constexpr double pi = EIGEN_PI;
 
 /// F_k - n at (h, 0, 0) in a right-angled corner whose wall is x = 0: a ray meets the wall after
 /// h / -omega_x, and what is farther than 16 R is not seen. Midpoint rule over (cos, phi).
 Openness corner_by_integration(double h, double spacing) {
     constexpr int steps = 800;
-    Eigen::Matrix<double, 9, 1> sum = Eigen::Matrix<double, 9, 1>::Zero();
+    Eigen::Matrix<double, Openness::RowsAtCompileTime, 1> sum;
+    sum.setZero();
     for (int i = 0; i < steps; ++i)
         for (int j = 0; j < 2 * steps; ++j) {
             const double cosine = (i + 0.5) / steps, phi = pi * (j + 0.5) / steps;
             const double sine = std::sqrt(1.0 - cosine * cosine);
             const Eigen::Vector3d omega(sine * std::cos(phi), cosine, sine * std::sin(phi));
             const double t = omega.x() < 0.0 ? h / -omega.x() : 1e9;
-            for (int k = 0; k < 3; ++k) {
+            for (int k = 0; k < openness_distances; ++k) {
                 const double open =
                     t < 16.0 * spacing ? 1.0 - std::exp(-t / (distances[k] * spacing)) : 1.0;
                 sum.segment<3>(3 * k) += omega * open * (pi / steps / steps) / pi;
             }
         }
-    for (int k = 0; k < 3; ++k)
+    for (int k = 0; k < openness_distances; ++k)
         sum[3 * k + 1] -= 1.0;
     return sum.cast<float>();
 }
@@ -53,7 +54,7 @@ TEST(OpennessProbe, InACornerIsItsIntegral) {
         for (const float h : {0.02f, 0.3f, 1.0f, 5.0f}) {
             const Openness exact = corner_by_integration(h, spacing);
             const Openness measured = probe({Vec3(h, 0, 0), Vec3::UnitY()});
-            for (int c = 0; c < 9; ++c)
+            for (int c = 0; c < exact.size(); ++c)
                 EXPECT_NEAR(measured[c], exact[c], 2e-3f) << "h " << h << ", component " << c;
             EXPECT_GT(exact.cwiseAbs().maxCoeff(), 0.05f) << "nothing to see here";
         }

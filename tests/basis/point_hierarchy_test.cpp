@@ -104,7 +104,7 @@ TEST(PointHierarchy, OverlapsAboutAsMuchWhereOpennessCrowdsItsFinestLevel) {
         return side[1] > 0.95f; // half of R
     };
     for (std::uint32_t i = points.begin(2); i < points.end(2); ++i) {
-        EXPECT_GT(points.support[i], 1.5f * points.spacing[2] / 8.0f);
+        EXPECT_GT(points.support[i], 1.5f * points.spacing[2] / 32.0f);
         EXPECT_LE(points.support[i], 2.25f * points.spacing[2]);
         const int edge = near_edge(points.position.col(i));
         mean_support[edge] += points.support[i];

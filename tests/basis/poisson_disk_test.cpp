@@ -138,9 +138,9 @@ TEST(PoissonDisk, CrowdsWhereTheOpennessChangesAndNowhereElse) {
                 const double difference2 = openness_difference2(disk.openness[i], disk.openness[j]);
                 EXPECT_GT(d * std::exp(difference2 / (2.0 * s * s)), 0.9999 * spacing) << name;
             }
-        EXPECT_GT(closest, 0.9999 * spacing / 8.0) << name;
+        EXPECT_GT(closest, 0.9999 * spacing / 32.0) << name;
         // The features are those of the points.
-        const OpennessProbe probe(surface, spacing, 48);
+        const OpennessProbe probe(surface, spacing, PoissonDiskOptions().openness_rays);
         for (std::size_t i = 0; i < disk.points.size(); i += 50)
             EXPECT_LT(openness_difference2(disk.openness[i], probe(disk.points[i].at)), 1e-6f);
     }

@@ -141,5 +141,17 @@ TEST(PullOperator, AveragesChildrenFromFineToCoarse) {
     EXPECT_EQ(values, (std::vector<float>{6.5f, 65, -2, -20, 2, 20, 8, 80, 1, 10, 3, 30}));
 }
 
+TEST(PullOperator, UpdatesCoarseCoefficientsByTheMeanOfFinerOnes) {
+    PointHierarchy points;
+    points.level_begin = {0, 2, 4, 6};
+    points.spacing = {1.0f, 0.5f, 0.25f};
+    const PullOperator pull{
+        join_rows<float>({{{2, 0.25f}, {3, 0.75f}}, {}, {{4, 0.5f}, {5, 0.5f}}, {}})};
+    std::vector<float> c{1, 10, 2, 20, 3, 30, 8, 80, 1, 10, 3, 30};
+    pull.update(points, 3, 2, c);
+    // 2 gets the mean 2 of 4 and 5; 0 gets a quarter of the new 2 and three quarters of 3.
+    EXPECT_EQ(c, (std::vector<float>{8, 80, 2, 20, 5, 50, 8, 80, 1, 10, 3, 30}));
+}
+
 } // namespace
 } // namespace afterglow

@@ -126,7 +126,6 @@ std::uint64_t long_row(Parts& parts, const std::string& begin, std::uint64_t row
 TEST(HostileTransferFile, NumbersThatCannotBeAreRefusedThoughTheChecksumsAreRight) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const float infinite = std::numeric_limits<float>::infinity();
-    const std::uint16_t half_nan = 0x7e00, half_infinite = 0xfc00;
     expect_refusal({
         {"position NaN", set("points.position", 4, nan)},
         {"position infinite", set("points.position", 0, infinite)},
@@ -145,9 +144,14 @@ TEST(HostileTransferFile, NumbersThatCannotBeAreRefusedThoughTheChecksumsAreRigh
         {"push NaN", set("push.value", 0, nan)},
         {"push negative", set("push.value", 0, -0.5f)},
         {"push huge", set("push.value", 0, 1e30f)},
-        {"link NaN", set("links.value", 7, half_nan)},
-        {"link infinite", set("links.value", 0, half_infinite)},
     });
+}
+
+/// Replaces the bits of the first entry of the links.
+Damage first_link(std::uint32_t bits) {
+    return set("links.packed", 0,
+               PackedLink{static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),
+                          static_cast<std::uint8_t>(bits >> 16)});
 }
 
 TEST(HostileTransferFile, RowsThatAreNotRowsAreRefused) {
@@ -159,21 +163,14 @@ TEST(HostileTransferFile, RowsThatAreNotRowsAreRefused) {
         {"links end elsewhere", set("links.begin", points, std::uint64_t(3))},
         {"links offset far", set("links.begin", 5, far)},
         {"links offset falls", set("links.begin", 5, std::uint64_t(0))},
-        {"links row unsorted",
-         [](Parts& p) {
-             const auto at = long_row(p, "links.begin");
-             const auto sender = p.values<std::uint16_t>("links.sender");
-             std::swap(sender[at], sender[at + 1]);
-         }},
-        {"links row repeats",
-         [](Parts& p) {
-             const auto at = long_row(p, "links.begin");
-             const auto sender = p.values<std::uint16_t>("links.sender");
-             sender[at + 1] = sender[at];
-         }},
+        {"links step of nothing", first_link(0x111000)},
+        {"links jump of nothing", first_link(0)},
         {"links sender out of range",
          [=](Parts& p) {
-             p.values<std::uint16_t>("links.sender").back() = static_cast<std::uint16_t>(senders);
+             // The last link's step, by as many senders as there are and no fewer.
+             auto bytes = p.values<PackedLink>("links.packed");
+             const std::uint32_t jump = std::min(senders, 4095u);
+             bytes.back() = {static_cast<std::uint8_t>(jump), static_cast<std::uint8_t>(jump >> 8), 0};
          }},
         {"push offset falls", set("push.begin", points - 1, std::uint64_t(0))},
         {"push of the coarsest", [](Parts& p) { p.values<std::uint64_t>("push.begin")[1] = 1; }},
@@ -214,26 +211,21 @@ TEST(HostileTransferFile, SizesThatDoNotAgreeAreRefused) {
              p.shorten("spacing", 0);
          }},
         {"nothing in level_begin", [](Parts& p) { p.shorten("level_begin", 0); }},
-        {"value of two",
+        {"link of two bytes",
          [](Parts& p) {
-             p.tensor("links.value").shape = {p.bytes["links.value"].size() / 4, 2};
+             p.bytes["links.packed"].resize(p.bytes["links.packed"].size() / 6 * 6);
+             p.tensor("links.packed").shape = {p.bytes["links.packed"].size() / 2, 2};
          }},
         {"position flat",
          [](Parts& p) {
              p.tensor("points.position").shape = {p.bytes["points.position"].size() / 4};
          }},
         {"other type", [](Parts& p) { p.tensor("points.support").dtype = DType::u32; }},
-        {"wide senders",
-         [](Parts& p) {
-             p.bytes["links.sender"].resize(2 * p.bytes["links.sender"].size());
-             p.tensor("links.sender").dtype = DType::u32;
-         }},
     };
     for (const char* name :
          {"points.position", "points.normal", "points.support", "points.reflectance", "level_begin",
           "spacing", "push.begin", "push.index", "push.value", "pull.begin", "pull.index",
-          "pull.value", "links.begin",
-          "links.sender", "links.value"}) {
+          "pull.value", "links.begin", "links.packed"}) {
         damages[std::string(name) + " is short"] = [=](Parts& p) {
             p.shorten(name, p.tensor(name).shape[0] - 1);
         };
@@ -253,7 +245,7 @@ TEST(HostileTransferFile, MetadataThatMakesNoSenseIsRefused) {
     };
     std::map<std::string, Damage> damages = {
         {"another format", metadata("format", "something else")},
-        {"another version", metadata("format_version", "2")},
+        {"another version", metadata("format_version", "1")},
         {"seed of letters", metadata("seed", "one")},
         {"seed and more", metadata("seed", "1 ")},
         {"no path", metadata("scene", "")},

@@ -20,6 +20,18 @@ def sums(row, terms, rows):
     return np.stack([np.bincount(row, column, rows) for column in terms.T], axis=1)
 
 
+def unpack_links(begin, packed):
+    """Receiver, sender and value of each link."""
+    bits = packed.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)
+    is_link = bits >> 12 != 0
+    reached = np.cumsum(np.where(is_link, bits & 127, bits & 4095), dtype=np.int64)
+    row = row_numbers(begin)
+    sender = reached - np.append(0, reached)[begin[row].astype(int)] - 1
+    nibble = (bits[:, None] >> np.array([12, 16, 20], np.uint32) & 15).astype(np.int32)
+    value = (nibble - 16 * (nibble > 7)) * np.exp2((bits >> 7 & 31) - 31.0)[:, None]
+    return row[is_link], sender[is_link], value[is_link]
+
+
 def apply_transfer(tensors, metadata, radiosity):
     level, sender_levels = tensors["level_begin"], json.loads(metadata["model"])["sender_levels"]
     senders, points = level[sender_levels], level[-1]
@@ -27,23 +39,25 @@ def apply_transfer(tensors, metadata, radiosity):
     child = row_numbers(tensors["push.begin"])
     entries = [slice(tensors["push.begin"][level[l]], tensors["push.begin"][level[l + 1]])
                for l in range(len(level) - 1)]  # of the points of each level
+    index, share = tensors["pull.index"], tensors["pull.value"][:, None]
+    above = row_numbers(tensors["pull.begin"])
+    averaged = [slice(tensors["pull.begin"][level[l]], tensors["pull.begin"][level[l + 1]])
+                for l in range(sender_levels - 1)]  # entries of the senders of each level
 
     # Pull: a coarser point's value becomes the mean of those that it sees below.
     value = radiosity.astype(float)
-    index, share = tensors["pull.index"], tensors["pull.value"][:, None]
-    above = row_numbers(tensors["pull.begin"])
-    for l in reversed(range(sender_levels - 1)):
-        e = slice(tensors["pull.begin"][level[l]], tensors["pull.begin"][level[l + 1]])
+    for e in reversed(averaged):
         mean = sums(above[e], share[e] * value[index[e]], senders)
         value = np.where(np.bincount(above[e], minlength=senders)[:, None] > 0, mean, value)
 
-    # Coefficients: what the next coarser level does not predict.
+    # Coefficients: what the next coarser level does not predict; their mean is that level's.
     e = slice(0, tensors["push.begin"][senders])
     coefficient = value - sums(child[e], weight[e] * value[parent[e]], senders)
+    for e in reversed(averaged):
+        coefficient += sums(above[e], share[e] * coefficient[index[e]], senders)
 
     # T e, then push: each level adds what the next coarser one predicts.
-    link, sender = tensors["links.value"].astype(np.float32), tensors["links.sender"]
-    receiver = row_numbers(tensors["links.begin"])
+    receiver, sender, link = unpack_links(tensors["links.begin"], tensors["links.packed"])
     field = np.concatenate([sums(receiver, link[:, axis, None] * coefficient[sender], points)
                             for axis in range(3)], axis=1)
     for e in entries[1:]:

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -21,12 +22,17 @@ struct Example {
     int sender_levels;
     ShepardBasis basis;
     PushOperator push;
+    PullOperator pull;
 
     Example(const std::string& name, float coarse_radius, int receiver_levels, int sender_levels_)
         : scene(make_builtin_scene(name)), surface(scene),
           points(make_points(surface, coarse_radius, receiver_levels)),
           sender_levels(sender_levels_), basis(points, surface, true),
-          push(make_push_operator(basis)) {}
+          push(make_push_operator(basis)) {
+        SenderRows rows(surface, basis, sender_levels);
+        count_arrivals(surface, rows, points, 1);
+        pull = rows.make_pull_operator();
+    }
 
     static PointHierarchy make_points(const Surface& surface, float coarse_radius, int levels) {
         CandidateSource source(surface, {*surface.scene().viewpoint}, 1);
@@ -40,22 +46,20 @@ struct Example {
                 LinkStatistics* statistics = nullptr) const {
         LinkStatistics unused;
         SenderRows rows(surface, basis, sender_levels, patch_share);
-        return make_links(surface, points, push, rows, options, statistics ? *statistics : unused);
+        return make_links(surface, points, push, pull, rows, options,
+                          statistics ? *statistics : unused);
     }
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
 
     /// Vector irradiance at all receivers by sender coefficients: T, then push. 3 x receivers.
-    Eigen::Matrix3Xd field(const Links& links, const Eigen::VectorXd& coefficients) const {
+    Eigen::Matrix3Xd field(const Links& links, const Eigen::VectorXd& c) const {
         Eigen::Matrix3Xd v(3, points.size());
         for (Index i = 0; i < v.cols(); ++i) {
             Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-            for (std::size_t k = 0; k < links.indices(i).size(); ++k) {
-                const LinkValue& t = links.values(i)[k];
-                sum += Eigen::Vector3d(static_cast<float>(t[0]), static_cast<float>(t[1]),
-                                       static_cast<float>(t[2]))
-                       * coefficients[links.indices(i)[k]];
-            }
+            links.for_each(i, [&](std::uint32_t j, const LinkVector& link) {
+                sum += link.head<3>().cast<double>() * c[j];
+            });
             for (std::size_t k = 0; k < push.parents.indices(i).size(); ++k)
                 sum += push.parents.values(i)[k] * v.col(push.parents.indices(i)[k]);
             v.col(i) = sum;
@@ -63,12 +67,15 @@ struct Example {
         return v;
     }
 
-    /// Coefficients of sender values, from the definition of push.
-    Eigen::VectorXd difference(const Eigen::VectorXd& values) const {
+    /// Coefficients of sender values, from the definitions of push and update.
+    Eigen::VectorXd coefficients(const Eigen::VectorXd& values) const {
         Eigen::VectorXd c = values;
         for (std::uint32_t i = 0; i < senders(); ++i)
             for (std::size_t k = 0; k < push.parents.indices(i).size(); ++k)
                 c[i] -= push.parents.values(i)[k] * values[push.parents.indices(i)[k]];
+        for (std::uint32_t k = points.begin(sender_levels - 1); k-- > 0;)
+            for (std::size_t e = 0; e < pull.children.indices(k).size(); ++e)
+                c[k] += pull.children.values(k)[e] * c[pull.children.indices(k)[e]];
         return c;
     }
 
@@ -136,11 +143,12 @@ TEST(Links, AreThePlainGatherOfEachSender) {
                                        example.points.point(i), functionals, 20'000, 1000 + i);
         const MeanAndError found = over_repetitions(measured[i]);
         for (Index f = 0; f < functionals.cols(); ++f) {
-            // Senders that hardly any ray meets have no normal distribution. Half floats round to
-            // 2^-11 of each link.
+            // Senders that hardly any ray meets have no normal distribution. Links are rounded to
+            // steps of which their largest component has four to seven; in a sum that averages.
             if (f < senders && expected.mean[f] < 0.01) continue;
+            const double rounding = f < senders ? 0.05 : 0.01;
             (f < senders ? single : fields)
-                .compare(found.mean[f], found.error[f] + 2e-4 * std::abs(found.mean[f]),
+                .compare(found.mean[f], found.error[f] + rounding * std::abs(found.mean[f]),
                          expected.mean[f], expected.error[f],
                          "receiver " + std::to_string(i) + ", functional " + std::to_string(f));
         }
@@ -173,7 +181,7 @@ TEST(Links, OfEveryLevelAddUpToThePlainGather) {
         options.seed = 200 + seed;
         const Links links = example.links(options, 0.03f);
         for (Index f = 0; f < 6; ++f) {
-            const Eigen::Matrix3Xd v = example.field(links, example.difference(values.col(f)));
+            const Eigen::Matrix3Xd v = example.field(links, example.coefficients(values.col(f)));
             for (std::uint32_t i = 0; i < example.points.size(); ++i)
                 measured[i](f, seed) = v.col(i).dot(example.points.normal.col(i).cast<double>());
         }
@@ -188,7 +196,7 @@ TEST(Links, OfEveryLevelAddUpToThePlainGather) {
                                            example.points.point(i), values, 10'000, 2000 + i);
             const MeanAndError found = over_repetitions(measured[i]);
             for (Index f = 0; f < 6; ++f)
-                agreement.compare(found.mean[f], found.error[f] + 3e-4 * std::abs(found.mean[f]),
+                agreement.compare(found.mean[f], found.error[f] + 5e-3 * std::abs(found.mean[f]),
                                   expected.mean[f], expected.error[f],
                                   "receiver " + std::to_string(i) + " on level "
                                       + std::to_string(level) + ", field " + std::to_string(f));
@@ -230,30 +238,30 @@ TEST(Links, BecomeFewerAndLessExactAsTheThresholdGrows) {
     Eigen::VectorXd values(example.senders());
     for (Index j = 0; j < values.size(); ++j)
         values[j] = example.points.position(1, j) > 0.3f ? 1.0 : 0.2;
-    const Eigen::VectorXd coefficients = example.difference(values);
+    const Eigen::VectorXd coefficients = example.coefficients(values);
     LinkOptions options;
     options.rays = 256;
     options.threshold = 0.0f;
     LinkStatistics statistics;
     const Links all = example.links(options, 0.5f, &statistics);
-    EXPECT_EQ(statistics.links_before, all.entries());
+    EXPECT_EQ(statistics.links_before, all.count(0, all.rows()));
     const Eigen::Matrix3Xd exact = example.field(all, coefficients);
-    std::uint64_t last_count = all.entries();
+    std::uint64_t last_count = all.count(0, all.rows());
     double last_error = 0.0;
     for (const float threshold : {8e-3f, 3.2e-2f, 1.28e-1f}) {
         options.threshold = threshold;
         LinkStatistics s;
         const Links links = example.links(options, 0.5f, &s);
         const double error = (example.field(links, coefficients) - exact).norm() / exact.norm();
-        EXPECT_LT(links.entries(), 0.8 * last_count);
+        EXPECT_LT(links.count(0, links.rows()), 0.8 * last_count);
         EXPECT_GT(error, last_error);
         EXPECT_LT(error, 2.0 * threshold); // of the norm: what is dropped partly cancels
-        last_count = links.entries();
+        last_count = links.count(0, links.rows());
         last_error = error;
         std::uint64_t counted = 0;
         for (const std::uint64_t n : s.links)
             counted += n;
-        EXPECT_EQ(counted, links.entries());
+        EXPECT_EQ(counted, links.count(0, links.rows()));
     }
 }
 
@@ -267,10 +275,11 @@ TEST(Links, KeepEveryCoarseSenderThatTheCoarsestReceiversSee) {
     const Links kept = example.links(options, 0.5f);
     for (std::uint32_t i = 0; i < example.points.end(0); ++i) {
         std::size_t before = 0, after = 0;
-        for (const std::uint32_t j : all.indices(i))
-            before += j < example.points.end(0);
-        for (const std::uint32_t j : kept.indices(i))
-            after += j < example.points.end(0);
+        const auto coarsest = [&](std::size_t& count) {
+            return [&](std::uint32_t j, const LinkVector&) { count += j < example.points.end(0); };
+        };
+        all.for_each(i, coarsest(before));
+        kept.for_each(i, coarsest(after));
         EXPECT_EQ(before, after) << "receiver " << i;
         EXPECT_GT(after, 0u);
     }
@@ -283,13 +292,12 @@ TEST(Links, HaveSortedRowsOfSenders) {
     const Links links = example.links(options, 0.5f);
     ASSERT_EQ(links.rows(), example.points.size());
     for (Index i = 0; i < links.rows(); ++i) {
-        const auto index = links.indices(i);
-        for (std::size_t k = 0; k < index.size(); ++k) {
-            EXPECT_LT(index[k], example.senders());
-            if (k > 0) {
-                EXPECT_LT(index[k - 1], index[k]);
-            }
-        }
+        std::int64_t before = -1;
+        links.for_each(i, [&](std::uint32_t j, const LinkVector&) {
+            EXPECT_LT(before, j);
+            EXPECT_LT(j, example.senders());
+            before = j;
+        });
     }
 }
 
@@ -303,10 +311,8 @@ TEST(Links, DependOnTheSeedButNotOnThreads) {
         return example.links(options, 0.5f);
     };
     const auto equal = [](const Links& a, const Links& b) {
-        if (a.entries() != b.entries() || a.rows() != b.rows()) return false;
-        for (std::uint64_t k = 0; k < a.entries(); ++k)
-            if (a.index[k] != b.index[k] || a.value[k] != b.value[k]) return false;
-        return true;
+        return std::ranges::equal(a.begin.span(), b.begin.span())
+               && std::ranges::equal(a.entry.span(), b.entry.span());
     };
     const Links one = make(1, 3);
     EXPECT_TRUE(equal(one, make(2, 3)));
