@@ -208,15 +208,15 @@ void add_precompute_command(CLI::App& app) {
            "Where the scene is looked at from (default: found by itself)")
         ->type_name("x,y,z");
     add_number(*sub, "--coarse-radius", command->coarse_radius,
-               "Distance between the coarsest points (default: a third of the typical distance "
+               "Distance between the coarsest points (default: 1.28 times the typical distance "
                "between surfaces); halves from level to level");
     sub->add_option("--receiver-levels", command->options.receiver_levels,
-                    "Levels of receivers, each twice as fine as the one before (default 4)");
+                    "Levels of receivers, each twice as fine as the one before (default 6)");
     sub->add_option("--sender-levels", command->options.sender_levels,
-                    "Levels of senders, spaced alike (default 3)");
+                    "Levels of senders, spaced alike (default 5)");
     sub->add_option("--rays", command->options.links.rays,
-                    "Gather rays of each finest point, made a power of two (default 512); twice as "
-                    "many a level up")
+                    "Gather rays of each finest point, made a power of two (default 512); more on "
+                    "coarser levels")
         ->check(CLI::Range(1, 32768));
     sub->add_option("--bounces", command->bounces, "Bounces of indirect light (default 0: all)")
         ->check(CLI::Range(0, most_bounces));

@@ -141,9 +141,26 @@ private:
             if (d.norm() > limit) stay_size += d.norm();
             else dropped += d;
         });
+        // What rounding adds or takes goes on to the next smaller one, so that their sum is right to
+        // half a step of the smallest.
+        coarsest_.clear();
         link_.for_each(0, points_.end(0), [&](std::uint32_t j, const LinkVector& d) {
-            if (d.norm() > limit) store(j, d + (d.norm() / stay_size) * dropped);
+            if (d.norm() > limit)
+                coarsest_.push_back({d.norm(), j, d + (d.norm() / stay_size) * dropped});
         });
+        std::sort(coarsest_.begin(), coarsest_.end(), [](const Coarsest& a, const Coarsest& b) {
+            return a.size != b.size ? a.size > b.size : a.sender < b.sender;
+        });
+        LinkVector rest = LinkVector::Zero();
+        for (Coarsest& c : coarsest_) {
+            const LinkVector wanted = c.link + rest;
+            c.link = LinkPacker::rounded(wanted);
+            rest = wanted - c.link;
+        }
+        std::sort(coarsest_.begin(), coarsest_.end(),
+                  [](const Coarsest& a, const Coarsest& b) { return a.sender < b.sender; });
+        for (const Coarsest& c : coarsest_)
+            store(c.sender, c.link);
 
         for (int k = 1; k < sender_levels_; ++k)
             link_.for_each(points_.begin(k), points_.end(k),
@@ -176,6 +193,12 @@ private:
     Accumulator<LinkVector> link_;
     Accumulator<LinkVector> predicted_;
     LinkPacker packer_;
+    struct Coarsest {
+        float size;
+        std::uint32_t sender;
+        LinkVector link;
+    };
+    std::vector<Coarsest> coarsest_;
 };
 
 LevelThresholds level_thresholds(const LinkOptions& options, const PointHierarchy& points,

@@ -31,29 +31,31 @@ using PackedLink = std::array<std::uint8_t, 3>;
 /// Writes the rows of links.
 class LinkPacker {
 public:
-    /// Appends a link to a row; senders must rise within it. Returns the value as it will be read,
-    /// which is zero, and nothing is appended, where the link is below 2^-32.
+    /// What a link is rounded to; zero where it is below 2^-32.
+    static LinkVector rounded(const LinkVector& value) {
+        const float step = step_of(exponent_of(value));
+        return step * (value / step).array().round().min(float{most}).max(-float{most});
+    }
+
+    /// Appends a link, rounded, to a row; senders must rise within it. Returns the value as it will
+    /// be read; nothing is appended where that is zero.
     LinkVector append(std::uint32_t sender, const LinkVector& value, std::vector<PackedLink>& row) {
         if (row.empty()) last_ = -1;
-        const float size = value.cwiseAbs().maxCoeff();
-        int exponent = 0;
-        std::frexp(size / (most + 0.5f), &exponent); // size < (most + 1/2) 2^exponent
-        exponent = std::clamp(exponent + 31, 0, 31);
-        const float step = step_of(static_cast<std::uint32_t>(exponent));
-        const LinkVector rounded =
-            (value / step).array().round().min(float{most}).max(-float{most});
-        if (rounded.isZero(0.0f)) return LinkVector::Zero();
+        const LinkVector stored = rounded(value);
+        if (stored.isZero(0.0f)) return stored;
 
         std::int64_t distance = static_cast<std::int64_t>(sender) - last_;
         for (; distance > longest_step; distance -= std::min<std::int64_t>(distance - 1, longest_jump))
             push(static_cast<std::uint32_t>(std::min<std::int64_t>(distance - 1, longest_jump)), row);
-        std::uint32_t bits =
-            static_cast<std::uint32_t>(distance) | static_cast<std::uint32_t>(exponent) << 7;
-        for (int c = 0; c < 3; ++c)
-            bits |= (static_cast<std::uint32_t>(static_cast<int>(rounded[c])) & 15u) << (12 + 4 * c);
+        const std::uint32_t exponent = exponent_of(value);
+        std::uint32_t bits = static_cast<std::uint32_t>(distance) | exponent << 7;
+        for (int c = 0; c < 3; ++c) {
+            const auto steps = static_cast<std::int32_t>(stored[c] / step_of(exponent));
+            bits |= (static_cast<std::uint32_t>(steps) & 15u) << (12 + 4 * c);
+        }
         push(bits, row);
         last_ = sender;
-        return rounded * step;
+        return stored;
     }
 
     static float step_of(std::uint32_t exponent) {
@@ -63,6 +65,13 @@ public:
 private:
     static constexpr int most = 7;
     static constexpr std::int64_t longest_step = 127, longest_jump = 4095;
+
+    /// The smallest step of which a link's largest component has no more than seven and a half.
+    static std::uint32_t exponent_of(const LinkVector& value) {
+        int exponent = 0;
+        std::frexp(value.cwiseAbs().maxCoeff() / (most + 0.5f), &exponent);
+        return static_cast<std::uint32_t>(std::clamp(exponent + 31, 0, 31));
+    }
 
     static void push(std::uint32_t bits, std::vector<PackedLink>& row) {
         row.push_back({static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(bits >> 8),

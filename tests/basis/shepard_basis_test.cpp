@@ -192,5 +192,18 @@ TEST(ShepardBasis, AppendsToARow) {
         EXPECT_EQ(behind[k + 1].value, alone[k].value);
 }
 
+TEST(DropSmallShares, KeepsTheRestInProportion) {
+    std::vector<BasisEntry> row{{3, 0.6f}, {5, 0.04f}, {8, 0.3f}, {9, 0.02f}, {12, 0.04f}};
+    drop_small_shares(row);
+    ASSERT_EQ(row.size(), 2u);
+    EXPECT_EQ(row[0].index, 3u);
+    EXPECT_EQ(row[1].index, 8u);
+    EXPECT_FLOAT_EQ(row[0].value, 2.0f / 3.0f);
+    EXPECT_FLOAT_EQ(row[1].value, 1.0f / 3.0f);
+    std::vector<BasisEntry> empty;
+    drop_small_shares(empty);
+    EXPECT_TRUE(empty.empty());
+}
+
 } // namespace
 } // namespace afterglow

@@ -29,6 +29,7 @@ std::vector<BasisEntry> seen_field(const ShepardBasis& basis, const Footprint& f
         for (int k = l; k >= 0 && row.empty(); --k)
             basis.evaluate(k, y, row);
         if (row.empty()) basis.evaluate_or_nearest(l, y, row);
+        drop_small_shares(row);
         for (const BasisEntry& entry : row)
             field.push_back({entry.index, static_cast<float>(weight) * entry.value});
     }
