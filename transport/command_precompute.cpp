@@ -6,7 +6,6 @@
 #include "transport/cli_options.h"
 #include "transport/precompute.h"
 #include "transport/provenance.h"
-#include "transport/target_error.h"
 #include "transport/transfer_file.h"
 
 #include <CLI/CLI.hpp>
@@ -28,7 +27,7 @@ using Clock = std::chrono::steady_clock;
 
 struct PrecomputeCommand {
     std::string scene, output, report, operator_name = "neumann";
-    double target_error = default_target_error, epsilon = 0.0, coarse_radius = 0.0;
+    double target_error = LinkOptions().target_error, epsilon = 0.0, coarse_radius = 0.0;
     int bounces = 0;
     PrecomputeOptions options;
     RunOptions run;
@@ -52,13 +51,16 @@ Json vector_json(const Vec3& v) {
 Json options_json(const PrecomputeCommand& command) {
     const PrecomputeOptions& options = command.options;
     Json json = {{"operator", command.operator_name},
-                 {"threshold", std::stod(number_text(options.links.threshold))},
                  {"coarse_radius", command.coarse_radius},
                  {"receiver_levels", options.receiver_levels},
                  {"sender_levels", options.sender_levels},
                  {"rays", options.links.rays},
                  {"bounces", command.bounces},
                  {"seed", options.seed}};
+    if (options.links.threshold)
+        json["epsilon"] = command.epsilon;
+    else
+        json["target_error"] = command.target_error;
     if (options.viewpoint) json["viewpoint"] = vector_json(*options.viewpoint);
     return json;
 }
@@ -80,6 +82,7 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
             {"levels", levels},
             {"senders", transfer.senders()},
             {"links", transfer.links.count(0, transfer.links.rows())},
+            {"threshold", std::stod(number_text(report.links.threshold))},
             {"links_before", report.links.links_before},
             {"rays_of_points", report.points_rays},
             {"rays_of_links", report.links.rays},
@@ -177,8 +180,8 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     PrecomputeOptions& options = command.options;
     options.seed = command.run.seed;
     options.coarse_radius = static_cast<float>(command.coarse_radius);
-    options.links.threshold = given("--epsilon") ? static_cast<float>(command.epsilon)
-                                                 : threshold_for_error(command.target_error);
+    if (given("--epsilon")) options.links.threshold = static_cast<float>(command.epsilon);
+    options.links.target_error = command.target_error;
     options.links.rays = std::max(16, static_cast<int>(std::bit_ceil(
                                           static_cast<unsigned>(options.links.rays))));
     check(options);

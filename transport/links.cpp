@@ -201,12 +201,12 @@ private:
     std::vector<Coarsest> coarsest_;
 };
 
-LevelThresholds level_thresholds(const LinkOptions& options, const PointHierarchy& points,
-                                 int sender_levels, int level) {
+LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, int sender_levels,
+                                 int level) {
     const int display = points.levels() - 1;
     const auto receiver = [&](int l) {
         const float finer = points.spacing.back() / points.spacing[l];
-        return options.threshold * (l == display ? 4.0f : finer * finer);
+        return threshold * (l == display ? 4.0f : finer * finer);
     };
     LevelThresholds thresholds{{}, level != display, 0.0f};
     for (int k = 0; k < sender_levels; ++k)
@@ -235,6 +235,12 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
 
 } // namespace
 
+float link_threshold(const LinkOptions& options, const PointHierarchy& points) {
+    const double share = std::min(1.0, points.size() / 60'000.0);
+    return options.threshold.value_or(
+        static_cast<float>(0.032 * options.target_error * std::sqrt(share)));
+}
+
 GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,
                                    int level) {
     const float coarser = std::log2(points.spacing[level] / points.spacing.back());
@@ -256,11 +262,12 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     ScratchPool<RowMaker> makers(
         [&] { return std::make_unique<RowMaker>(points, push, pull, rows); });
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
+    statistics.threshold = link_threshold(options, points);
     for (int l = 0; l < points.levels(); ++l) {
         statistics.links.push_back(0);
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
-        const LevelThresholds thresholds = level_thresholds(options, points, rows.levels(), l);
+        const LevelThresholds thresholds = level_thresholds(statistics.threshold, points, rows.levels(), l);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());

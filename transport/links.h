@@ -6,6 +6,7 @@
 #include "transport/packed_links.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace afterglow {
@@ -25,16 +26,23 @@ struct LinkOptions {
     /// the display level loses stays where it is, and its links are the noisiest.
     /// Senders: coefficients on level k are of shadow edges, which cross a share of the functions
     /// that goes like R_k, so that their root mean square goes like R_k^(1/2).
-    float threshold = 3.2e-3f;
+    std::optional<float> threshold; // where none is given, link_threshold() makes it from
+    double target_error = 0.1;      // the relative error that dropped links may make
     std::uint64_t seed = 1;
 };
 
 struct LinkStatistics {
     std::uint64_t rays = 0, links_before = 0; // before: before the threshold
+    float threshold = 0.0f;
     std::vector<std::uint64_t> links; // that are stored, a receiver level
     double trace_seconds = 0.0, rows_seconds = 0.0, links_seconds = 0.0;
     std::uint64_t patches = 0, uncovered_patches = 0;
 };
+
+/// The threshold that is given, or 0.032 target_error sqrt(min(1, N / 60 000)) for N points: what is
+/// dropped is a sum of links each below the threshold, so the error is taken to grow in proportion to
+/// it; and a scene of few points can have more links to each, its file stays small.
+float link_threshold(const LinkOptions& options, const PointHierarchy& points);
 
 /// The rays of the receivers of one level, of so many.
 GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,
