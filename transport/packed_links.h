@@ -96,7 +96,7 @@ struct Links {
     std::uint64_t count(Index first, Index last) const {
         return static_cast<std::uint64_t>(std::count_if(
             entry.data() + begin[first], entry.data() + begin[last],
-            [](const PackedLink& packed) { return bits_of(packed) >> 12 != 0; }));
+            [](const PackedLink& packed) { return !is_jump(bits_of(packed)); }));
     }
 
     /// Calls visit(sender, LinkVector) for the links of a row, senders rising.
@@ -105,11 +105,8 @@ struct Links {
         std::uint32_t sender = ~0u;
         for (const PackedLink& packed : row(i)) {
             const std::uint32_t bits = bits_of(packed);
-            if (bits >> 12 == 0) {
-                sender += bits;
-                continue;
-            }
-            sender += bits & 127u;
+            sender += step_of(bits);
+            if (is_jump(bits)) continue;
             const auto component = [&](int c) {
                 return static_cast<float>(static_cast<std::int32_t>(bits << (16 - 4 * c)) >> 28);
             };
@@ -118,6 +115,9 @@ struct Links {
         }
     }
 
+    /// What the bits of an entry say: whether it is a jump, and how many senders further it leads.
+    static bool is_jump(std::uint32_t bits) { return bits >> 12 == 0; }
+    static std::uint32_t step_of(std::uint32_t bits) { return is_jump(bits) ? bits : bits & 127u; }
     static std::uint32_t bits_of(const PackedLink& packed) {
         return packed[0] | static_cast<std::uint32_t>(packed[1]) << 8
                | static_cast<std::uint32_t>(packed[2]) << 16;

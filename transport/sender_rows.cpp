@@ -9,6 +9,7 @@
 #include <utility>
 
 namespace afterglow {
+
 SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels,
                        float patch_share)
     : surface_(surface), basis_(basis) {

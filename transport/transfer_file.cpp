@@ -243,8 +243,7 @@ private:
             for (Index row = from; row < to; ++row) {
                 std::int64_t sender = -1;
                 for (const PackedLink& packed : links.row(row)) {
-                    const std::uint32_t bits = Links::bits_of(packed);
-                    const std::uint32_t step = bits >> 12 == 0 ? bits : bits & 127u;
+                    const std::uint32_t step = Links::step_of(Links::bits_of(packed));
                     good &= step > 0;
                     sender += step;
                 }

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 
 namespace afterglow {
@@ -67,6 +69,26 @@ TEST(ThreadLimit, HoldsWhileItLives) {
         EXPECT_EQ(thread_count(), 1);
     }
     EXPECT_EQ(thread_count(), before);
+}
+
+TEST(ScratchPool, MakesNoMoreThanRunAtOnceAndLendsNoneTwice) {
+    std::atomic<int> made = 0, in_use_twice = 0;
+    ScratchPool<std::atomic<int>> pool([&] {
+        ++made;
+        return std::make_unique<std::atomic<int>>(0);
+    });
+    const ThreadLimit limit(2);
+    parallel_for(
+        1000,
+        [&](Index) {
+            const auto users = pool.borrow();
+            in_use_twice += users->fetch_add(1) != 0;
+            users->fetch_sub(1);
+        },
+        1);
+    EXPECT_EQ(in_use_twice, 0);
+    EXPECT_GE(made, 1);
+    EXPECT_LE(made, 2);
 }
 
 } // namespace
