@@ -19,10 +19,6 @@ struct InfoCommand {
     bool json = false;
 };
 
-std::uint64_t links_of_level(const TransferOperator& transfer, int level) {
-    return transfer.links.count(transfer.points.begin(level), transfer.points.end(level));
-}
-
 Json info_json(const TransferFile& file) {
     const TransferOperator& transfer = file.transfer;
     Json levels = Json::array(), bytes = Json::object();
@@ -30,17 +26,18 @@ Json info_json(const TransferFile& file) {
         levels.push_back({{"functions", transfer.points.end(l) - transfer.points.begin(l)},
                           {"spacing", transfer.points.spacing[static_cast<std::size_t>(l)]},
                           {"sender", l < transfer.sender_levels},
-                          {"links", links_of_level(transfer, l)}});
+                          {"links", transfer.link_count(l)}});
     for (const auto& [name, count] : file.tensor_bytes)
         bytes[name] = count;
     return {{"version", file.provenance.version},
             {"scene", file.provenance.scene},
             {"scene_hash", file.provenance.scene_hash},
             {"seed", file.provenance.seed},
+            {"operator", operator_name(transfer.kind)},
             {"receivers", transfer.points.size()},
             {"senders", transfer.senders()},
             {"bounces", transfer.bounces},
-            {"links", transfer.links.count(0, transfer.links.rows())},
+            {"links", transfer.link_count()},
             {"levels", levels},
             {"bytes", bytes},
             {"options", Json::parse(file.provenance.options)},
@@ -62,17 +59,19 @@ void print_text(const TransferFile& file) {
     std::printf("hash        %s\n", provenance.scene_hash.c_str());
     std::printf("written by  afterglow %s\n", provenance.version.c_str());
     std::printf("options     %s\n", provenance.options.c_str());
+    std::printf("operator    %s\n", operator_name(transfer.kind));
     std::printf("receivers   %u on %d levels\n", transfer.points.size(), transfer.points.levels());
     std::printf("senders     %u on %d levels\n", transfer.senders(), transfer.sender_levels);
     const auto megabytes = [&](const char* prefix) {
         return static_cast<double>(bytes_of(file, prefix)) * 1e-6;
     };
     std::printf("megabytes   %.2f: links %.2f, push %.2f, points %.2f\n", megabytes(""),
-                megabytes("links."), megabytes("push."), megabytes("points."));
+                megabytes("links.") + megabytes("solution."),
+                megabytes("push.") + megabytes("pyramid."), megabytes("points."));
     std::printf("level  functions    spacing       links  links a function\n");
     for (int l = 0; l < transfer.points.levels(); ++l) {
         const std::uint32_t functions = transfer.points.end(l) - transfer.points.begin(l);
-        const std::uint64_t links = links_of_level(transfer, l);
+        const std::uint64_t links = transfer.link_count(l);
         std::printf("%5d  %9u  %9.4g  %10llu  %16.1f\n", l, functions,
                     static_cast<double>(transfer.points.spacing[static_cast<std::size_t>(l)]),
                     static_cast<unsigned long long>(links),

@@ -28,7 +28,6 @@ using Clock = std::chrono::steady_clock;
 struct PrecomputeCommand {
     std::string scene, output, report, operator_name = "neumann";
     double target_error = LinkOptions().target_error, epsilon = 0.0, coarse_radius = 0.0;
-    int bounces = 0;
     PrecomputeOptions options;
     RunOptions run;
 };
@@ -55,10 +54,10 @@ Json options_json(const PrecomputeCommand& command) {
                  {"receiver_levels", options.receiver_levels},
                  {"sender_levels", options.sender_levels},
                  {"rays", options.links.rays},
-                 {"bounces", command.bounces},
+                 {"bounces", options.bounces},
                  {"seed", options.seed}};
     if (options.links.threshold)
-        json["epsilon"] = command.epsilon;
+        json["epsilon"] = std::stod(number_text(*options.links.threshold));
     else
         json["target_error"] = command.target_error;
     if (options.viewpoint) json["viewpoint"] = vector_json(*options.viewpoint);
@@ -75,13 +74,13 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
         levels.push_back({{"functions", level.points},
                           {"candidates", level.candidates_tried},
                           {"largest_gap", level.largest_gap},
-                          {"links", report.links.links[static_cast<std::size_t>(l)]}});
+                          {"links", transfer.link_count(l)}});
     }
     return {{"viewpoints", viewpoints},
             {"mean_ray_length", report.mean_ray_length},
             {"levels", levels},
             {"senders", transfer.senders()},
-            {"links", transfer.links.count(0, transfer.links.rows())},
+            {"links", transfer.link_count()},
             {"threshold", std::stod(number_text(report.links.threshold))},
             {"links_before", report.links.links_before},
             {"rays_of_points", report.points_rays},
@@ -99,6 +98,7 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
             {"gather", report.links.trace_seconds},
             {"rows", report.links.rows_seconds},
             {"links", report.links.links_seconds},
+            {"series", report.series_seconds},
             {"precompute", report.total_seconds},
             {"write", outer.write},
             {"total", outer.total}};
@@ -111,7 +111,7 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
     };
     for (int l = 0; l < transfer.points.levels(); ++l) {
         const auto functions = transfer.points.end(l) - transfer.points.begin(l);
-        const std::uint64_t links = report.links.links[static_cast<std::size_t>(l)];
+        const std::uint64_t links = transfer.link_count(l);
         say("level %d: %u functions, spacing %.4g, %.1f links a function%s\n", l, functions,
             static_cast<double>(transfer.points.spacing[static_cast<std::size_t>(l)]),
             static_cast<double>(links) / std::max(1u, functions),
@@ -119,7 +119,7 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
     }
     say("%s: %.1f MB, %.3g links of %.3g, %.3g rays, %s\n", command.output.c_str(),
         static_cast<double>(std::filesystem::file_size(command.output)) * 1e-6,
-        static_cast<double>(transfer.links.count(0, transfer.links.rows())),
+        static_cast<double>(transfer.link_count()),
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
         duration_text(outer.total).c_str());
@@ -140,8 +140,7 @@ void run(PrecomputeCommand& command) {
     outer.tree = lap(time);
 
     PrecomputeReport report;
-    TransferOperator transfer = precompute(surface, command.options, &report);
-    transfer.bounces = command.bounces;
+    const TransferOperator transfer = precompute(surface, command.options, &report);
     lap(time);
     const Json options = options_json(command), statistics = statistics_json(transfer, report);
     const std::string hash = scene.content_hash();
@@ -169,8 +168,18 @@ void run(PrecomputeCommand& command) {
 /// Turns what was typed into PrecomputeOptions; throws UsageError for what cannot be.
 void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     const auto given = [&](const char* option) { return sub.count(option) > 0; };
-    if (command.operator_name != "neumann")
-        throw UsageError("unknown operator '" + command.operator_name + "'; there is neumann");
+    if (command.operator_name == "paper") {
+        if (given("--target-error"))
+            throw UsageError("--operator paper knows no --target-error; use --epsilon");
+        const PrecomputeOptions paper = PrecomputeOptions::paper();
+        command.options.kind = paper.kind;
+        command.options.links.threshold = paper.links.threshold;
+        if (!given("--sender-levels")) command.options.sender_levels = paper.sender_levels;
+        if (!given("--bounces")) command.options.bounces = paper.bounces;
+    } else if (command.operator_name != "neumann") {
+        throw UsageError("unknown operator '" + command.operator_name
+                         + "'; there are neumann and paper");
+    }
     if (given("--target-error") && !(command.target_error > 0.0))
         throw UsageError("--target-error must be positive");
     if (given("--epsilon") && !(command.epsilon >= 0.0))
@@ -199,10 +208,11 @@ void add_precompute_command(CLI::App& app) {
         add_number(*sub, "--target-error", command->target_error,
                    "Relative error of the indirect irradiance that dropped links may make "
                    "(default 0.1)");
-    add_number(*sub, "--epsilon", command->epsilon, "Instead: links below this size are dropped")
+    add_number(*sub, "--epsilon", command->epsilon, "Instead: links below this size are dropped (default of --operator paper: 0.025/pi)")
         ->excludes(target_error);
     sub->add_option("--operator", command->operator_name,
-                    "neumann: one bounce, repeated at run time (default)");
+                    "neumann: one bounce, repeated at run time (default); paper: several bounces, "
+                    "stored, as Lehtinen et al. printed it");
     sub->add_option_function<std::string>(
            "--viewpoint",
            [command](const std::string& text) {
@@ -212,16 +222,17 @@ void add_precompute_command(CLI::App& app) {
         ->type_name("x,y,z");
     add_number(*sub, "--coarse-radius", command->coarse_radius,
                "Distance between the coarsest points (default: 1.28 times the typical distance "
-               "between surfaces); halves from level to level");
+               "between surfaces; of --operator paper 0.64 times); halves from level to level");
     sub->add_option("--receiver-levels", command->options.receiver_levels,
                     "Levels of receivers, each twice as fine as the one before (default 6)");
     sub->add_option("--sender-levels", command->options.sender_levels,
-                    "Levels of senders, spaced alike (default 5)");
+                    "Levels of senders, spaced alike (default 5; of --operator paper 3)");
     sub->add_option("--rays", command->options.links.rays,
                     "Gather rays of each finest point, made a power of two (default 512); more on "
                     "coarser levels")
         ->check(CLI::Range(1, 32768));
-    sub->add_option("--bounces", command->bounces, "Bounces of indirect light (default 0: all)")
+    sub->add_option("--bounces", command->options.bounces,
+                    "Bounces of indirect light (default 0: all; of --operator paper 4)")
         ->check(CLI::Range(0, most_bounces));
     sub->add_option("--report", command->report, "JSON file for counts and times");
     add_run_options(*sub, command->run);

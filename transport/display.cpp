@@ -3,12 +3,18 @@
 namespace afterglow {
 
 Display::Display(const TransferOperator& transfer, const Surface& surface)
-    : transfer_(transfer), basis_(transfer.points, surface, true) {}
+    : transfer_(transfer),
+      basis_(transfer.points, surface, transfer.kind == OperatorKind::neumann) {}
 
 Rgb Display::irradiance(const SurfacePoint& x, const VectorIrradiance& field, bool& covered) const {
     thread_local std::vector<BasisEntry> row;
     row.clear();
-    basis_.evaluate_or_nearest(transfer_.display_level(), x, row);
+    const int last = transfer_.points.levels() - 1;
+    if (transfer_.kind == OperatorKind::neumann)
+        basis_.evaluate_or_nearest(last, x, row);
+    else
+        for (int l = 0; l <= last; ++l)
+            basis_.evaluate(l, x, row);
     covered = !row.empty();
     Rgb sum = Rgb::Zero();
     for (const BasisEntry& entry : row) {

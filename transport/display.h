@@ -7,15 +7,16 @@
 
 namespace afterglow {
 
-/// Reads a field over the finest level's points at any surface point: what renderers and queries
-/// share. Only one level is evaluated, whatever the number of levels.
+/// Reads a field at any surface point: what renderers and queries share. One level is evaluated,
+/// the last, whatever the number of levels; of the paper's operator all are [LZT08, eq. (6)].
 class Display {
 public:
     /// Keeps references.
     Display(const TransferOperator& transfer, const Surface& surface);
 
     /// Indirect irradiance [W/m^2] = max(0, n . sum_j B_j(x) V_j); zero and `covered` false where no
-    /// function and no close point in sight covers x. `field` as from LightTransport::indirect.
+    /// function covers x (and, but of the paper's operator, no close point is in sight). `field` as
+    /// from LightTransport::indirect.
     Rgb irradiance(const SurfacePoint& x, const VectorIrradiance& field, bool& covered) const;
 
 private:

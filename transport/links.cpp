@@ -41,20 +41,19 @@ public:
           predicted_(points.end(rows.levels() - 1), LinkVector::Zero()) {}
 
     /// Fills `kept` with the links of receiver i that are stored, and `pushed` where there are
-    /// children. `parents`: the pushed rows of the level above, its first point first. Returns how
-    /// many were stored, and adds how many there were to `links_before`.
-    std::uint64_t make(Index i, int level, std::span<const GatherSample> samples,
+    /// children. `parents`: the pushed rows of the level above, its first point first. Adds how many
+    /// there were to `links_before`.
+    void make(Index i, int level, std::span<const GatherSample> samples,
                        std::span<const PushedRow> parents, const LevelThresholds& thresholds,
                        std::vector<PackedLink>& kept, PushedRow& pushed,
                        std::uint64_t& links_before) {
         gather(samples);
         difference_senders(thresholds.kept[0]);
         if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
-        const std::uint64_t stored = threshold(level, thresholds.kept, kept, links_before);
+        threshold(level, thresholds.kept, kept, links_before);
         if (thresholds.has_children) push_down(thresholds.negligible, pushed);
         link_.clear();
         predicted_.clear();
-        return stored;
     }
 
 private:
@@ -114,14 +113,11 @@ private:
     }
 
     /// Moves to `kept` what is stored of link_, and adds it to predicted_.
-    std::uint64_t threshold(int level, const std::vector<float>& smallest,
-                            std::vector<PackedLink>& kept, std::uint64_t& links_before) {
-        std::uint64_t stored = 0;
+    void threshold(int level, const std::vector<float>& smallest, std::vector<PackedLink>& kept,
+                   std::uint64_t& links_before) {
         const auto store = [&](std::uint32_t j, const LinkVector& d) {
             const LinkVector value = packer_.append(j, d, kept);
-            if (value.isZero(0.0f)) return;
-            predicted_.at(j) += value;
-            ++stored;
+            if (!value.isZero(0.0f)) predicted_.at(j) += value;
         };
         // The coarsest senders: what is dropped goes onto those that stay, in proportion to their
         // size. One stays, the largest, where all together are not small. The coarsest receivers
@@ -169,7 +165,6 @@ private:
                                links_before += size2 > 0.0f;
                                if (size2 > smallest[k] * smallest[k]) store(j, d);
                            });
-        return stored;
     }
 
     /// Prediction and stored links together, less what is small. Links to the coarsest senders all
@@ -264,17 +259,13 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     statistics.threshold = link_threshold(options, points);
     for (int l = 0; l < points.levels(); ++l) {
-        statistics.links.push_back(0);
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
         const LevelThresholds thresholds = level_thresholds(statistics.threshold, points, rows.levels(), l);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
-        struct Count {
-            std::uint64_t before = 0, stored = 0;
-        };
-        std::vector<Count> counts(static_cast<std::size_t>((batch + grain - 1) / grain));
+        std::vector<std::uint64_t> links_before(static_cast<std::size_t>((batch + grain - 1) / grain));
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
             auto start = Clock::now();
@@ -291,22 +282,19 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
             statistics.rows_seconds += seconds_since(start);
 
             start = Clock::now();
-            std::fill(counts.begin(), counts.end(), Count{});
+            std::fill(links_before.begin(), links_before.end(), 0);
             parallel_ranges(end - begin, grain, [&](Index first, Index last) {
                 const auto maker = makers.borrow();
-                Count& count = counts[first / grain];
                 for (Index r = first; r < last; ++r)
-                    count.stored += maker->make(
+                    maker->make(
                         begin + r, l,
                         std::span(samples).subspan(static_cast<std::size_t>(r) * directions.rays(),
                                                    static_cast<std::size_t>(directions.rays())),
                         parents, thresholds, done[begin + r], pushed[begin + r - points.begin(l)],
-                        count.before);
+                        links_before[static_cast<std::size_t>(first / grain)]);
             });
-            for (const Count& count : counts) {
-                statistics.links_before += count.before;
-                statistics.links.back() += count.stored;
-            }
+            for (const std::uint64_t count : links_before)
+                statistics.links_before += count;
             statistics.links_seconds += seconds_since(start);
         }
     }

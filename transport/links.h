@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 namespace afterglow {
 
@@ -34,7 +33,6 @@ struct LinkOptions {
 struct LinkStatistics {
     std::uint64_t rays = 0, links_before = 0; // before: before the threshold
     float threshold = 0.0f;
-    std::vector<std::uint64_t> links; // that are stored, a receiver level
     double trace_seconds = 0.0, rows_seconds = 0.0, links_seconds = 0.0;
     std::uint64_t patches = 0, uncovered_patches = 0;
 };

@@ -1,6 +1,8 @@
 #include "transport/precompute.h"
 
 #include "core/error.h"
+#include "transport/paper_links.h"
+#include "transport/paper_series.h"
 
 #include <algorithm>
 #include <bit>
@@ -19,8 +21,74 @@ double seconds_since(Clock::time_point start) {
 /// The coarsest spacing as a share of the typical ray length: a few functions a room. With the
 /// default levels the finest senders are 1/25 of that length apart.
 constexpr float coarsest_share = 1.28f;
+/// Half of it gives the numbers of functions that the paper prints for Sponza [LZT08, table 1].
+constexpr float paper_coarsest_share = 0.64f;
+
+HierarchyOptions hierarchy_options(const PrecomputeOptions& options, double mean_ray_length) {
+    const bool paper = options.kind == OperatorKind::paper;
+    HierarchyOptions hierarchy;
+    hierarchy.coarse_radius = options.coarse_radius > 0.0f
+                                  ? options.coarse_radius
+                                  : (paper ? paper_coarsest_share : coarsest_share)
+                                        * static_cast<float>(mean_ray_length);
+    hierarchy.seed = options.seed;
+    if (paper) {
+        hierarchy.levels = options.receiver_levels;
+        hierarchy.shape = BasisShape::paper();
+    } else {
+        hierarchy.levels = std::max(options.receiver_levels - 1, options.sender_levels);
+        hierarchy.display = {std::ldexp(hierarchy.coarse_radius, 1 - options.receiver_levels),
+                             options.receiver_levels - 2, options.openness_density};
+    }
+    return hierarchy;
+}
+
+void make_neumann(const Surface& surface, const LinkOptions& links, TransferOperator& transfer,
+                  PrecomputeReport& report) {
+    auto start = Clock::now();
+    const ShepardBasis basis(transfer.points, surface, true);
+    transfer.push = make_push_operator(basis);
+    report.push_seconds = seconds_since(start);
+
+    start = Clock::now();
+    SenderRows rows(surface, basis, transfer.sender_levels);
+    count_arrivals(surface, rows, transfer.points, links.seed);
+    transfer.pull = rows.make_pull_operator();
+    report.pull_seconds = seconds_since(start);
+    transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,
+                                report.links);
+}
+
+void make_paper(const Surface& surface, const LinkOptions& links, TransferOperator& transfer,
+                PrecomputeReport& report) {
+    auto start = Clock::now();
+    const ShepardBasis basis(transfer.points, surface, false);
+    transfer.pyramid = make_pyramid(basis, transfer.sender_levels);
+    report.push_seconds = seconds_since(start);
+
+    start = Clock::now();
+    transfer.pull = make_point_pull(basis, transfer.sender_levels);
+    report.pull_seconds = seconds_since(start);
+    RgbLinks one_bounce =
+        make_paper_links(surface, basis, transfer.sender_levels, links, report.links);
+
+    start = Clock::now();
+    transfer.solution =
+        make_paper_series(std::move(one_bounce), basis, transfer.sender_levels, transfer.pyramid,
+                          transfer.pull, transfer.bounces, report.links.threshold);
+    report.series_seconds = seconds_since(start);
+}
 
 } // namespace
+
+PrecomputeOptions PrecomputeOptions::paper() {
+    PrecomputeOptions options;
+    options.kind = OperatorKind::paper;
+    options.sender_levels = 3;
+    options.bounces = 4;
+    options.links.threshold = 0.025f / static_cast<float>(EIGEN_PI);
+    return options;
+}
 
 void check(const PrecomputeOptions& options) {
     if (options.receiver_levels < 2 || options.receiver_levels > 10)
@@ -32,6 +100,13 @@ void check(const PrecomputeOptions& options) {
     const int rays = options.links.rays;
     if (rays < 16 || rays > 32768 || !std::has_single_bit(static_cast<unsigned>(rays)))
         throw UsageError("--rays must be a power of two between 16 and 32768");
+    if (options.kind == OperatorKind::paper) {
+        if (options.sender_levels > options.receiver_levels)
+            throw UsageError("--operator paper has at most as many levels of senders as of receivers");
+        if (options.bounces < 1)
+            throw UsageError("--operator paper stores a number of bounces: --bounces must be positive");
+        if (!options.links.threshold) throw UsageError("--operator paper needs --epsilon");
+    }
 }
 
 TransferOperator precompute(const Surface& surface, const PrecomputeOptions& options,
@@ -47,35 +122,20 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     r.mean_ray_length = source.mean_ray_length();
 
     TransferOperator transfer;
+    transfer.kind = options.kind;
     transfer.sender_levels = options.sender_levels;
-    HierarchyOptions hierarchy;
-    hierarchy.coarse_radius
-        = options.coarse_radius > 0.0f
-              ? options.coarse_radius
-              : coarsest_share * static_cast<float>(r.mean_ray_length);
-    hierarchy.levels = std::max(options.receiver_levels - 1, options.sender_levels);
-    hierarchy.display = {std::ldexp(hierarchy.coarse_radius, 1 - options.receiver_levels),
-                         options.receiver_levels - 2, options.openness_density};
-    hierarchy.shape = options.shape;
-    hierarchy.seed = options.seed;
-    transfer.points = build_hierarchy(source, hierarchy, &r.hierarchy);
+    transfer.bounces = options.bounces;
+    transfer.points =
+        build_hierarchy(source, hierarchy_options(options, r.mean_ray_length), &r.hierarchy);
     r.points_seconds = seconds_since(start);
     r.points_rays = source.rays();
 
-    const auto push_start = Clock::now();
-    const ShepardBasis basis(transfer.points, surface, options.see_walls);
-    transfer.push = make_push_operator(basis);
-    r.push_seconds = seconds_since(push_start);
-
-    SenderRows rows(surface, basis, options.sender_levels);
     LinkOptions links = options.links;
     links.seed = options.seed;
-    const auto pull_start = Clock::now();
-    count_arrivals(surface, rows, transfer.points, options.seed);
-    transfer.pull = rows.make_pull_operator();
-    r.pull_seconds = seconds_since(pull_start);
-    transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,
-                                r.links);
+    if (options.kind == OperatorKind::paper)
+        make_paper(surface, links, transfer, r);
+    else
+        make_neumann(surface, links, transfer, r);
     r.total_seconds = seconds_since(start);
     return transfer;
 }

@@ -5,14 +5,13 @@
 #include "transport/transfer_operator.h"
 
 #include <cstdint>
-#include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace afterglow {
 
 struct PrecomputeOptions {
+    OperatorKind kind = OperatorKind::neumann;
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
     float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length
     /// Levels of receivers, spacing R, R/2, R/4 ...; the last is the display level.
@@ -22,15 +21,20 @@ struct PrecomputeOptions {
     /// bounces, what the coarser ones receive.
     int sender_levels = 5;
     LinkOptions links;
-    BasisShape shape;
+    int bounces = 0; // of indirect light; 0: all of them
     float openness_density = 0.1f; // of the display level, see DisplayLevel
-    bool see_walls = true;
     std::uint64_t seed = 1;
+
+    /// For OperatorKind::paper, as printed [LZT08, secs. 2.3 and 4.2]: three levels of senders, four
+    /// bounces, epsilon .025 (of links without our 1/pi). All receivers are on regular levels; of
+    /// LinkOptions only rays, threshold and seed are looked at.
+    static PrecomputeOptions paper();
 };
 
 /// Wall-clock seconds and counts of each stage, for --report.
 struct PrecomputeReport {
     double points_seconds = 0.0, push_seconds = 0.0, pull_seconds = 0.0;
+    double series_seconds = 0.0; // of the paper's bounces
     std::vector<Vec3> viewpoints;
     double mean_ray_length = 0.0;
     HierarchyStatistics hierarchy;

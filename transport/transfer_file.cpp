@@ -20,9 +20,9 @@ using Json = nlohmann::json;
 
 constexpr const char* format_name = "afterglow transfer";
 constexpr const char* format_version = "2";
-constexpr const char* operator_name = "neumann";
 
 static_assert(sizeof(PackedLink) == 3, "links are mapped as rows of three bytes");
+static_assert(sizeof(RgbLink) == 36, "links are mapped as rows of nine floats");
 
 // The scene's path
 
@@ -57,7 +57,7 @@ std::string opened_scene_path(const std::string& file, const std::string& stored
 // What the computation needs to know beside the arrays
 
 std::string model_text(const TransferOperator& transfer) {
-    return Json{{"operator", operator_name},
+    return Json{{"operator", operator_name(transfer.kind)},
                 {"sender_levels", transfer.sender_levels},
                 {"display_parent", transfer.points.parent_level.back()},
                 {"bounces", transfer.bounces},
@@ -76,9 +76,14 @@ public:
         check_format();
         read_points(result.transfer.points);
         read_model(result.transfer);
-        read_push(result.transfer);
         read_pull(result.transfer);
-        read_links(result.transfer);
+        if (result.transfer.kind == OperatorKind::paper) {
+            read_pyramid(result.transfer);
+            read_solution(result.transfer);
+        } else {
+            read_push(result.transfer);
+            read_links(result.transfer);
+        }
         read_provenance(result.provenance);
         for (const Tensor& tensor : file_.tensors())
             result.tensor_bytes.emplace_back(tensor.name, tensor.bytes.size());
@@ -142,14 +147,19 @@ private:
 
     void read_model(TransferOperator& transfer) const {
         const Json model = parse("model");
-        if (model.value("operator", Json()) != operator_name)
+        const Json name = model.value("operator", Json());
+        if (name == operator_name(OperatorKind::paper))
+            transfer.kind = OperatorKind::paper;
+        else if (name != operator_name(OperatorKind::neumann))
             fail("holds an operator that this program does not know");
         const int levels = transfer.points.levels();
         transfer.sender_levels = integer(model, "sender_levels", 1, levels);
         for (int l = 0; l < levels; ++l) transfer.points.parent_level.push_back(l - 1);
+        const bool paper = transfer.kind == OperatorKind::paper;
         if (levels > 1)
-            transfer.points.parent_level.back() = integer(model, "display_parent", 0, levels - 2);
-        transfer.bounces = integer(model, "bounces", 0, most_bounces);
+            transfer.points.parent_level.back() =
+                integer(model, "display_parent", paper ? levels - 2 : 0, levels - 2);
+        transfer.bounces = integer(model, "bounces", paper ? 1 : 0, most_bounces);
         transfer.points.shape.weight_power = integer(model, "weight_power", 1, 1000);
         if (transfer.senders() == 0) fail("has no senders");
     }
@@ -227,6 +237,20 @@ private:
         rows.value = shared(value);
     }
 
+    void read_pyramid(TransferOperator& transfer) const {
+        const PointHierarchy& points = transfer.points;
+        SparseRows<float>& rows = transfer.pyramid.coarser;
+        const auto index = tensor<std::uint32_t>("pyramid.index", {any_extent});
+        const auto value = tensor<float>("pyramid.value", {index.size()});
+        rows.begin = read_begin("pyramid.begin", transfer.senders(), index.size());
+        for (int l = 0; l < transfer.sender_levels; ++l)
+            check_rows("pyramid.index", rows.begin, index, points.begin(l), points.end(l), 0,
+                       points.begin(l));
+        check_shares("pyramid", value);
+        rows.index = shared(index);
+        rows.value = shared(value);
+    }
+
     void check_shares(const std::string& name, std::span<const float> value) const {
         if (!std::all_of(value.begin(), value.end(), [](float x) { return x >= 0.0f && x < 2.0f; }))
             fail("has a " + name + " weight that is no share");
@@ -251,6 +275,19 @@ private:
             }
             if (!good) fail("has a row of links that does not rise or leaves the senders");
         });
+    }
+
+    void read_solution(TransferOperator& transfer) const {
+        const std::uint32_t points = transfer.points.size();
+        RgbLinks& links = transfer.solution;
+        const auto index = tensor<std::uint32_t>("solution.index", {any_extent});
+        const auto value = tensor<float>("solution.value", {index.size(), 9});
+        if (!std::all_of(value.begin(), value.end(), [](float x) { return std::isfinite(x); }))
+            fail("has a link that is not finite");
+        links.begin = read_begin("solution.begin", points, index.size());
+        check_rows("solution.index", links.begin, index, 0, points, 0, transfer.senders());
+        links.index = shared(index);
+        links.value = {{reinterpret_cast<const RgbLink*>(value.data()), index.size()}, file_.map()};
     }
 
     void read_provenance(TransferProvenance& provenance) const {
@@ -290,33 +327,39 @@ std::span<const Scalar> values_of(const Eigen::Matrix<Scalar, Rows, Columns>& ma
 void save_transfer(const std::string& path, const TransferOperator& transfer,
                    const TransferProvenance& provenance) {
     const PointHierarchy& points = transfer.points;
-    const SparseRows<float>& push = transfer.push.parents;
-    const SparseRows<float>& pull = transfer.pull.children;
-    const Links& links = transfer.links;
     const std::uint64_t count = points.size(), levels = points.spacing.size();
-    const auto floats = [](std::string name, TensorShape shape, std::span<const float> values) {
-        return make_tensor(std::move(name), std::move(shape), values);
+    std::vector<Tensor> tensors;
+    const auto add = [&](std::string name, TensorShape shape, auto values) {
+        tensors.push_back(make_tensor(std::move(name), std::move(shape), values));
     };
-
-    const std::span<const std::uint8_t> packed{
-        reinterpret_cast<const std::uint8_t*>(links.entry.data()),
-        sizeof(PackedLink) * links.entries()};
-
-    const std::vector<Tensor> tensors = {
-        floats("points.position", {count, 3}, values_of(points.position)),
-        floats("points.normal", {count, 3}, values_of(points.normal)),
-        floats("points.support", {count}, values_of(points.support)),
-        floats("points.reflectance", {count, 3}, values_of(points.reflectance)),
-        make_tensor<std::uint32_t>("level_begin", {levels + 1}, points.level_begin),
-        floats("spacing", {levels}, points.spacing),
-        make_tensor("push.begin", {count + 1}, push.begin.span()),
-        make_tensor("push.index", {push.entries()}, push.index.span()),
-        make_tensor("push.value", {push.entries()}, push.value.span()),
-        make_tensor("pull.begin", {pull.begin.size()}, pull.begin.span()),
-        make_tensor("pull.index", {pull.entries()}, pull.index.span()),
-        make_tensor("pull.value", {pull.entries()}, pull.value.span()),
-        make_tensor("links.begin", {count + 1}, links.begin.span()),
-        make_tensor("links.packed", {links.entries(), sizeof(PackedLink)}, packed)};
+    const auto add_rows = [&](const std::string& name, const SparseRows<float>& rows) {
+        add(name + ".begin", {rows.begin.size()}, rows.begin.span());
+        add(name + ".index", {rows.entries()}, rows.index.span());
+        add(name + ".value", {rows.entries()}, rows.value.span());
+    };
+    add("points.position", {count, 3}, values_of(points.position));
+    add("points.normal", {count, 3}, values_of(points.normal));
+    add("points.support", {count}, values_of(points.support));
+    add("points.reflectance", {count, 3}, values_of(points.reflectance));
+    add("level_begin", {levels + 1}, std::span(points.level_begin));
+    add("spacing", {levels}, std::span(points.spacing));
+    if (transfer.kind == OperatorKind::paper) {
+        const RgbLinks& links = transfer.solution;
+        add_rows("pyramid", transfer.pyramid.coarser);
+        add_rows("pull", transfer.pull.children);
+        add("solution.begin", {count + 1}, links.begin.span());
+        add("solution.index", {links.entries()}, links.index.span());
+        add("solution.value", {links.entries(), 9},
+            std::span(reinterpret_cast<const float*>(links.value.data()), 9 * links.entries()));
+    } else {
+        const Links& links = transfer.links;
+        add_rows("push", transfer.push.parents);
+        add_rows("pull", transfer.pull.children);
+        add("links.begin", {count + 1}, links.begin.span());
+        add("links.packed", {links.entries(), sizeof(PackedLink)},
+            std::span(reinterpret_cast<const std::uint8_t*>(links.entry.data()),
+                      sizeof(PackedLink) * links.entries()));
+    }
 
     write_safetensors(path, tensors,
                       {{"format", format_name},

@@ -7,6 +7,20 @@
 
 namespace afterglow {
 
+const char* operator_name(OperatorKind kind) {
+    return kind == OperatorKind::paper ? "paper" : "neumann";
+}
+
+std::uint64_t TransferOperator::link_count(int level) const {
+    const std::uint32_t first = points.begin(level), last = points.end(level);
+    return kind == OperatorKind::paper ? solution.begin[last] - solution.begin[first]
+                                       : links.count(first, last);
+}
+
+std::uint64_t TransferOperator::link_count() const {
+    return kind == OperatorKind::paper ? solution.entries() : links.count(0, links.rows());
+}
+
 LightTransport::LightTransport(const TransferOperator& transfer)
     : transfer_(transfer) {}
 
@@ -97,8 +111,37 @@ VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
     return apply_links(coefficients(radiosity), transfer_.points.levels());
 }
 
+/// S e, where e are the coefficients of direct irradiance.
+VectorIrradiance LightTransport::apply_paper(const Surface& surface, const Spotlight& light) const {
+    const PointHierarchy& points = transfer_.points;
+    std::vector<float> e(3 * static_cast<std::size_t>(transfer_.senders()));
+    parallel_for(
+        transfer_.senders(),
+        [&](Index m) { Rgb::Map(&e[3 * m]) = direct_irradiance(surface, light, points.point(m)); },
+        256);
+    transfer_.pull.pull(points, transfer_.sender_levels, 3, e);
+    transfer_.pyramid.analyse(points, transfer_.sender_levels, 3, e);
+    VectorIrradiance field(9 * static_cast<std::size_t>(points.size()));
+    parallel_for(
+        points.size(),
+        [&](Index i) {
+            RgbLink sum = RgbLink::Zero();
+            const auto sender = transfer_.solution.indices(i);
+            const auto link = transfer_.solution.values(i);
+            for (std::size_t k = 0; k < sender.size(); ++k)
+                sum += link[k] * Rgb::Map(&e[3 * std::size_t{sender[k]}]).replicate<3, 1>();
+            RgbLink::Map(&field[9 * i]) = sum;
+        },
+        256);
+    return field;
+}
+
 VectorIrradiance LightTransport::indirect(const Surface& surface, const Spotlight& light,
                                           NeumannStatistics* statistics) const {
+    if (transfer_.kind == OperatorKind::paper) {
+        if (statistics) *statistics = {};
+        return apply_paper(surface, light);
+    }
     const Radiosity direct = direct_radiosity(surface, light);
     if (transfer_.bounces > 0) {
         if (statistics) *statistics = {transfer_.bounces - 1, 0.0};

@@ -2,8 +2,10 @@
 
 #include "basis/point_hierarchy.h"
 #include "basis/push.h"
+#include "basis/pyramid.h"
 #include "core/surface.h"
 #include "transport/links.h"
+#include "transport/rgb_links.h"
 #include "transport/spotlight.h"
 
 #include <cstdint>
@@ -14,25 +16,40 @@ namespace afterglow {
 
 inline constexpr int most_bounces = 1000; // that may be asked for by number
 
-/// All that a transfer file holds: the basis and the one-bounce operator over it. Senders are the
-/// points of the first `sender_levels` levels; receivers are those of the levels that lead to
-/// display.
+enum class OperatorKind {
+    neumann, // one bounce, applied again and again
+    paper    // the sum of several bounces, stored, as [LZT08] prints it
+};
+
+/// As it is called on the command line and in files.
+const char* operator_name(OperatorKind kind);
+
+/// All that a transfer file holds: the basis and the operator over it. Senders are the points of the
+/// first `sender_levels` levels; receivers are those of the levels that lead to display.
 struct TransferOperator {
+    OperatorKind kind = OperatorKind::neumann;
     PointHierarchy points;
     int sender_levels = 0;
-    PushOperator push;
     PullOperator pull; // of the senders
-    Links links;
-    int bounces = 0; // of indirect light, 0: all of them
+    int bounces = 0;   // of indirect light, 0: all of them
+
+    PushOperator push; // neumann
+    Links links;       // neumann: T
+
+    Pyramid pyramid;    // paper: of the senders
+    RgbLinks solution;  // paper: S
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
-    int display_level() const { return points.levels() - 1; }
+    /// The stored links of the receivers of a level, or of all.
+    std::uint64_t link_count(int level) const;
+    std::uint64_t link_count() const;
 };
 
 /// Three numbers (R, G, B) a sender point: its radiosity [W/m^2].
 using Radiosity = std::vector<float>;
 /// Nine numbers a point, component of space times colour: x.R, x.G, x.B, y.R ... [W/m^2]; the
-/// irradiance of a surface with normal n is max(0, n . V) per colour.
+/// irradiance of a surface with normal n is max(0, n . V) per colour. Of the paper's operator they
+/// are coefficients, of a field that is the sum over the levels.
 using VectorIrradiance = std::vector<float>;
 
 struct NeumannStatistics {
@@ -40,7 +57,8 @@ struct NeumannStatistics {
     double residual = 0.0; // relative to the first bounce
 };
 
-/// The operator at work: direct light in, indirect vector irradiance out.
+/// The operator at work: direct light in, indirect vector irradiance out. Of the paper's operator,
+/// indirect() alone is there.
 class LightTransport {
 public:
     /// Keeps a reference to `transfer`, which must outlive it.
@@ -77,6 +95,7 @@ private:
     /// Pulled, differenced and updated, four floats a sender (the last zero).
     std::vector<float> coefficients(const Radiosity& radiosity) const;
     VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
+    VectorIrradiance apply_paper(const Surface& surface, const Spotlight& light) const;
 };
 
 } // namespace afterglow

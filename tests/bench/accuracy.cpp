@@ -94,6 +94,10 @@ struct MeasureOptions {
 
 void add_measure_options(CLI::App& command, MeasureOptions& options) {
     PrecomputeOptions& p = options.precompute;
+    command.add_flag_callback(
+        "--paper", [&p] { p = PrecomputeOptions::paper(); },
+        "The paper's operator with its defaults, which the options below change");
+    command.add_option("--bounces", p.bounces);
     command.add_option("--rays", p.links.rays);
     command.add_option("--most-rays", p.links.most_rays);
     command.add_option("--epsilon", p.links.threshold);
@@ -222,19 +226,18 @@ void run_measure(const Common& common, const MeasureOptions& options) {
         const std::uint64_t bytes = std::filesystem::file_size(file);
         std::printf(
             "%s: %zu points, %lld uncovered, %.1f s (points %.1f push %.1f pull %.1f gather %.1f rows "
-            "%.1f links %.1f), %.0fM rays, %u receivers, %u senders, %.2fM links, %.1f MB\n",
+            "%.1f links %.1f series %.1f), %.0fM rays, %u receivers, %u senders, %.2fM links, %.1f MB\n",
             name.c_str(), reference.points.size(), static_cast<long long>(uncovered),
             report.total_seconds, report.points_seconds, report.push_seconds,
-            report.pull_seconds,
-            report.links.trace_seconds, report.links.rows_seconds, report.links.links_seconds,
+            report.pull_seconds, report.links.trace_seconds, report.links.rows_seconds,
+            report.links.links_seconds, report.series_seconds,
             1e-6 * static_cast<double>(report.links.rays), transfer.points.size(),
-            transfer.senders(),
-            1e-6 * static_cast<double>(transfer.links.count(0, transfer.links.rows())),
+            transfer.senders(), 1e-6 * static_cast<double>(transfer.link_count()),
             1e-6 * static_cast<double>(bytes));
         Json entry = {
             {"scene", name},    {"points", reference.points.size()}, {"uncovered", uncovered},
             {"lights", lights}, {"seconds", report.total_seconds},   {"bytes", bytes}};
-        if (options.time_rays) {
+        if (options.time_rays && transfer.kind == OperatorKind::neumann) {
             const double alone =
                 gather_rays_alone(surface, transfer.points, options.precompute.links);
             std::printf("%s: the same gather rays alone %.1f s, ray ratio %.2f\n", name.c_str(),

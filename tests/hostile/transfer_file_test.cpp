@@ -18,23 +18,32 @@ std::string load(const std::string& path) {
     return refusal_of([&] { load_transfer(path); });
 }
 
+std::string bytes_of(const SmallTransfer& small) {
+    const TemporaryFolder folder;
+    save_transfer(folder.path("t"), small.transfer, small.provenance);
+    return content_of(folder.path("t"));
+}
+
 const std::string& small_file() {
-    static const std::string bytes = [] {
-        const TemporaryFolder folder;
-        save_transfer(folder.path("t"), small_transfer().transfer, small_transfer().provenance);
-        return content_of(folder.path("t"));
-    }();
+    static const std::string bytes = bytes_of(small_transfer());
+    return bytes;
+}
+
+const std::string& small_paper_file() {
+    static const std::string bytes = bytes_of(small_paper_transfer());
     return bytes;
 }
 
 TEST(HostileTransferFile, ATruncatedFileIsAnError) {
     const TemporaryFolder folder;
-    const std::string path = folder.write("t", small_file());
-    ASSERT_EQ(load(path), "accepted");
-    for (std::size_t length = small_file().size() - 1; length > 0;
-         length -= length > 400 ? std::min<std::size_t>(length - 400, 997) : 1) {
-        std::filesystem::resize_file(path, length);
-        ASSERT_NE(load(path), "accepted") << length << " bytes";
+    for (const std::string* whole : {&small_file(), &small_paper_file()}) {
+        const std::string path = folder.write("t", *whole);
+        ASSERT_EQ(load(path), "accepted");
+        for (std::size_t length = whole->size() - 1; length > 0;
+             length -= length > 400 ? std::min<std::size_t>(length - 400, 997) : 1) {
+            std::filesystem::resize_file(path, length);
+            ASSERT_NE(load(path), "accepted") << length << " bytes";
+        }
     }
 }
 
@@ -96,9 +105,10 @@ struct Parts {
 
 using Damage = std::function<void(Parts&)>;
 
-void expect_refusal(const std::map<std::string, Damage>& damages) {
+void expect_refusal(const std::map<std::string, Damage>& damages,
+                    const std::string& whole = small_file()) {
     const TemporaryFolder folder;
-    const SafetensorsFile good(folder.write("good", small_file()));
+    const SafetensorsFile good(folder.write("good", whole));
     Parts untouched(good);
     untouched.write(folder.path("t"));
     ASSERT_EQ(load(folder.path("t")), "accepted");
@@ -188,6 +198,47 @@ TEST(HostileTransferFile, RowsThatAreNotRowsAreRefused) {
          [](Parts& p) { p.values<std::uint32_t>("pull.index")[0] = 0; }},
         {"push past a level", [](Parts& p) { p.values<std::uint32_t>("push.index").back() = 0; }},
     });
+}
+
+TEST(HostileTransferFile, APapersOperatorIsCheckedLikeOurs) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const TransferOperator& transfer = small_paper_transfer().transfer;
+    const std::uint32_t senders = transfer.senders(), points = transfer.points.size();
+    std::map<std::string, Damage> damages = {
+        {"link NaN", set("solution.value", 3, nan)},
+        {"links begin late", set("solution.begin", 0, std::uint64_t(1))},
+        {"links offset far", set("solution.begin", 5, std::uint64_t(1) << 60)},
+        {"links end elsewhere", set("solution.begin", points, std::uint64_t(3))},
+        {"sender out of range",
+         [=](Parts& p) { p.values<std::uint32_t>("solution.index").back() = senders; }},
+        {"links unsorted",
+         [](Parts& p) {
+             const auto at = long_row(p, "solution.begin");
+             const auto index = p.values<std::uint32_t>("solution.index");
+             std::swap(index[at], index[at + 1]);
+         }},
+        {"share NaN", set("pyramid.value", 0, nan)},
+        {"share negative", set("pyramid.value", 0, -0.5f)},
+        {"pyramid offset falls", set("pyramid.begin", senders - 1, std::uint64_t(0))},
+        {"pyramid of the coarsest",
+         [](Parts& p) { p.values<std::uint64_t>("pyramid.begin")[1] = 1; }},
+        {"pyramid from its own level",
+         [=](Parts& p) { p.values<std::uint32_t>("pyramid.index").back() = senders - 1; }},
+        {"no bounce", [](Parts& p) { p.change_model("\"bounces\":4", "\"bounces\":0"); }},
+        {"display predicted by another level",
+         [](Parts& p) { p.change_model("\"display_parent\":1", "\"display_parent\":0"); }},
+        {"ours by its name", [](Parts& p) { p.change_model("paper", "neumann"); }},
+    };
+    for (const char* name : {"pyramid.begin", "pyramid.index", "pyramid.value", "solution.begin",
+                             "solution.index", "solution.value"}) {
+        damages[std::string(name) + " is short"] = [=](Parts& p) {
+            p.shorten(name, p.tensor(name).shape[0] - 1);
+        };
+        damages[std::string(name) + " is missing"] = [=](Parts& p) {
+            p.tensors.erase(p.tensors.begin() + (&p.tensor(name) - p.tensors.data()));
+        };
+    }
+    expect_refusal(damages, small_paper_file());
 }
 
 TEST(HostileTransferFile, SizesThatDoNotAgreeAreRefused) {

@@ -88,6 +88,9 @@ TEST_F(CommandTransfer, WhatPrecomputeCannotDoIsStatusTwoAndLeavesNothing) {
                                 "--rays many",
                                 "--bounces -1",
                                 "--bounces 1e9",
+                                "--operator paper --target-error 0.1",
+                                "--operator paper --bounces 0",
+                                "--operator paper --sender-levels 7",
                                 "--seed -1",
                                 "--threads -1",
                                 "--spp 4",
@@ -202,6 +205,42 @@ TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
                             "\"options\":{", "\"scene_hash\":", "\"largest_gap\":"})
         EXPECT_NE(json.out.find(key), std::string::npos) << key;
     EXPECT_EQ(text.err + json.err, "");
+}
+
+TEST_F(CommandTransfer, ThePapersOperatorServesAllCommands) {
+    const std::string path = folder.path("t");
+    const Outcome made =
+        run("precompute builtin:cornell --operator paper --epsilon 0.0005 -o" + quoted(path)
+            + " --report" + quoted(folder.path("r.json")) + small_settings);
+    ASSERT_EQ(made.status, 0) << made.err;
+    const std::string report = content_of(folder.path("r.json"));
+    for (const char* part : {"\"operator\": \"paper\"", "\"bounces\": 4", "\"series\":"})
+        EXPECT_NE(report.find(part), std::string::npos) << part;
+    EXPECT_NE(run("info --json" + quoted(path)).out.find("\"operator\":\"paper\""),
+              std::string::npos);
+
+    std::map<std::string, Image> picture;
+    for (const auto& [name, from] : {std::pair("paper", path), std::pair("neumann", file())}) {
+        const std::string image = folder.path(std::string(name) + ".exr");
+        const Outcome rendered =
+            run("render" + quoted(from) + " --layer indirect -o" + quoted(image) + light + camera);
+        ASSERT_EQ(rendered.status, 0) << rendered.err;
+        picture[name] = read_exr(image);
+    }
+    double paper = 0.0, neumann = 0.0;
+    for (std::size_t k = 0; k < picture["paper"].rgb.size(); ++k) {
+        paper += picture["paper"].rgb[k];
+        neumann += picture["neumann"].rgb[k];
+    }
+    // A few hundred points, four bounces.
+    EXPECT_NEAR(paper / neumann, 0.95, 0.15);
+
+    const std::string points = folder.write("p.csv", "0.1,0,0.1,0,1,0\n");
+    ASSERT_EQ(run("query" + quoted(path) + " --points" + quoted(points) + " -o"
+                  + quoted(folder.path("a.csv")) + light)
+                  .status,
+              0);
+    EXPECT_GT(read_irradiance_csv(folder.path("a.csv")).minCoeff(), 0.0f);
 }
 
 TEST_F(CommandTransfer, ASceneThatHasChangedIsRefusedByItsHash) {

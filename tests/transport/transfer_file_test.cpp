@@ -24,33 +24,39 @@ const Spotlight lamp{Vec3(0.278f, 0.54f, 0.28f), -Vec3::UnitY(), 25.0f, 35.0f, R
 
 TEST(TransferFile, SavedLoadedAndSavedAgainItHasTheSameBytes) {
     const TemporaryFolder folder;
-    const SmallTransfer& small = small_transfer();
-    save_transfer(folder.path("a"), small.transfer, small.provenance);
-    const TransferFile loaded = load_transfer(folder.path("a"));
-    save_transfer(folder.path("b"), loaded.transfer, loaded.provenance);
-    EXPECT_EQ(content_of(folder.path("a")), content_of(folder.path("b")));
-    EXPECT_EQ(loaded.provenance.scene, "builtin:cornell");
-    EXPECT_EQ(loaded.provenance.options, small.provenance.options);
+    for (const SmallTransfer* small : {&small_transfer(), &small_paper_transfer()}) {
+        save_transfer(folder.path("a"), small->transfer, small->provenance);
+        const TransferFile loaded = load_transfer(folder.path("a"));
+        save_transfer(folder.path("b"), loaded.transfer, loaded.provenance);
+        EXPECT_EQ(content_of(folder.path("a")), content_of(folder.path("b")));
+        EXPECT_EQ(loaded.transfer.kind, small->options.kind);
+        EXPECT_EQ(loaded.transfer.bounces, small->options.bounces);
+        EXPECT_EQ(loaded.provenance.scene, "builtin:cornell");
+        EXPECT_EQ(loaded.provenance.options, small->provenance.options);
+    }
 }
 
 TEST(TransferFile, TheSameLightComesOutOfTheFile) {
     const TemporaryFolder folder;
-    const SmallTransfer& small = small_transfer();
-    save_transfer(folder.path("a"), small.transfer, small.provenance);
-    const TransferFile loaded = load_transfer(folder.path("a"));
-    std::filesystem::remove(folder.path("a")); // what is mapped stays
-    const VectorIrradiance before = LightTransport(small.transfer).indirect(small.surface, lamp);
-    EXPECT_EQ(before, LightTransport(loaded.transfer).indirect(small.surface, lamp));
-    EXPECT_GT(*std::max_element(before.begin(), before.end()), 0.0f);
+    for (const SmallTransfer* small : {&small_transfer(), &small_paper_transfer()}) {
+        save_transfer(folder.path("a"), small->transfer, small->provenance);
+        const TransferFile loaded = load_transfer(folder.path("a"));
+        std::filesystem::remove(folder.path("a")); // what is mapped stays
+        const VectorIrradiance before =
+            LightTransport(small->transfer).indirect(small->surface, lamp);
+        EXPECT_EQ(before, LightTransport(loaded.transfer).indirect(small->surface, lamp));
+        EXPECT_GT(*std::max_element(before.begin(), before.end()), 0.0f);
+    }
 }
 
 TEST(TransferFile, TheNumberOfThreadsDoesNotChangeAByte) {
-    const SmallTransfer& small = small_transfer();
-    const auto made_with = [&](int threads) {
-        const ThreadLimit limit(threads);
-        return saved(precompute(small.surface, small_options()), small.provenance);
-    };
-    EXPECT_EQ(made_with(1), made_with(2));
+    for (const SmallTransfer* small : {&small_transfer(), &small_paper_transfer()}) {
+        const auto made_with = [&](int threads) {
+            const ThreadLimit limit(threads);
+            return saved(precompute(small->surface, small->options), small->provenance);
+        };
+        EXPECT_EQ(made_with(1), made_with(2));
+    }
 }
 
 TEST(TransferFile, TheNumberOfBouncesIsKeptAndObeyed) {
