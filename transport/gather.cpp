@@ -76,7 +76,7 @@ void trace(const Surface& surface, const PointHierarchy& points, Index begin, In
 
 void count_arrivals(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
                     std::uint64_t seed) {
-    constexpr int rays = 32;
+    constexpr int rays = 8;
     for (int l = 0; l < points.levels(); ++l)
         if (points.leads_to_display(l))
             trace(surface, points, points.begin(l), points.end(l), points.begin(l),

@@ -55,7 +55,7 @@ private:
     std::array<std::uint32_t, 2> shift_;
 };
 
-/// Counts in `rows` where light arrives from, for SenderRows::make_pull_operator: the ends of 32
+/// Counts in `rows` where light arrives from, for SenderRows::make_pull_operator: the ends of 8
 /// rays of every receiver.
 void count_arrivals(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
                     std::uint64_t seed);

@@ -21,18 +21,14 @@ double seconds_since(Clock::time_point start) {
 /// The coarsest spacing as a share of the typical ray length: a few functions a room. With the
 /// default levels the finest senders are 1/25 of that length apart.
 constexpr float coarsest_share = 1.28f;
-/// Half of it gives the numbers of functions that the paper prints for Sponza [LZT08, table 1].
-constexpr float paper_coarsest_share = 0.64f;
 
 HierarchyOptions hierarchy_options(const PrecomputeOptions& options, double mean_ray_length) {
-    const bool paper = options.kind == OperatorKind::paper;
     HierarchyOptions hierarchy;
     hierarchy.coarse_radius = options.coarse_radius > 0.0f
                                   ? options.coarse_radius
-                                  : (paper ? paper_coarsest_share : coarsest_share)
-                                        * static_cast<float>(mean_ray_length);
+                                  : coarsest_share * static_cast<float>(mean_ray_length);
     hierarchy.seed = options.seed;
-    if (paper) {
+    if (options.kind == OperatorKind::paper) {
         hierarchy.levels = options.receiver_levels;
         hierarchy.shape = BasisShape::paper();
     } else {

@@ -5,10 +5,29 @@
 #include "transport/accumulator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <utility>
 
 namespace afterglow {
+namespace {
+
+/// Multiplies the weights of a row with what the functions' reflectance has in common with that at
+/// y; see SenderRows.
+void favour_equal_reflectance(const PointHierarchy& points, const Rgb& at_y,
+                              std::vector<BasisEntry>& row) {
+    constexpr float scale2 = 0.1f * 0.1f, least = 1e-3f;
+    float sum = 0.0f;
+    for (BasisEntry& entry : row) {
+        const Rgb difference = points.reflectance.col(entry.index).array() - at_y;
+        entry.value *= least + std::exp(-difference.square().mean() / scale2);
+        sum += entry.value;
+    }
+    for (BasisEntry& entry : row)
+        entry.value /= sum;
+}
+
+} // namespace
 
 SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels,
                        float patch_share)
@@ -35,11 +54,14 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
     parallel_for(static_cast<Index>(missing.size()), [&](Index i) {
         const int level = static_cast<int>(
             std::upper_bound(first_.begin(), first_.end(), missing[i]) - first_.begin() - 1);
-        const SurfacePoint x = surface_.point(grid_[level].center(missing[i] - first_[level]));
+        const Hit center = grid_[level].center(missing[i] - first_[level]);
+        const SurfacePoint x = surface_.point(center);
         // Where the level has no function, the next coarser speaks for it.
         for (int l = level; l >= 0 && rows[i].empty(); --l)
             basis_.evaluate(l, x, rows[i]);
         if (rows[i].empty()) basis_.evaluate_or_nearest(level, x, rows[i]);
+        if (level + 1 == levels())
+            favour_equal_reflectance(basis_.points(), surface_.reflectance(center), rows[i]);
         drop_small_shares(rows[i]);
     });
     for (std::size_t i = 0; i < missing.size(); ++i) {

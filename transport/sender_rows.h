@@ -13,6 +13,13 @@ namespace afterglow {
 /// How the field of the senders looks from a surface patch: for each sender level, weights of sender
 /// *values* (see PushOperator) that sum to one. Made on demand, once a patch and level, at the
 /// patch's centre: all hits in a patch see the same row, which is what makes the gather fast.
+///
+/// On the finest level a weight B_j(y) is multiplied with
+///
+///     10^-3 + exp(-|rho(y) - rho_j|^2 / (3 0.1^2)),
+///
+/// before the row is made to sum to one: radiosity jumps where reflectance does. (Coarser levels
+/// carry means over all that lies below them.)
 class SenderRows {
 public:
     /// Senders are the levels [0, levels) of the basis; the patches of a level are at most

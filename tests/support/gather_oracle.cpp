@@ -16,8 +16,24 @@ MeanAndError over_repetitions(const Eigen::ArrayXXd& values) {
     return result;
 }
 
+void weigh_by_reflectance(const PointHierarchy& points, const Rgb& reflectance,
+                          std::vector<BasisEntry>& row) {
+    double sum = 0.0;
+    std::vector<double> weight;
+    for (const BasisEntry& entry : row) {
+        double difference2 = 0.0;
+        for (int c = 0; c < 3; ++c)
+            difference2 += std::pow(points.reflectance(c, entry.index) - reflectance[c], 2) / 3.0;
+        weight.push_back(entry.value * (0.001 + std::exp(-difference2 / 0.01)));
+        sum += weight.back();
+    }
+    for (std::size_t k = 0; k < row.size(); ++k)
+        row[k].value = static_cast<float>(weight[k] / sum);
+}
+
 std::vector<BasisEntry> seen_field(const ShepardBasis& basis, const Footprint& footprint,
-                                   const SurfacePoint& y, double distance, double cosine) {
+                                   const SurfacePoint& y, const Rgb& reflectance, double distance,
+                                   double cosine) {
     const double size = footprint.angle * distance / std::max(cosine, 0.3);
     const double level =
         std::clamp(std::log2(footprint.coarsest_spacing / size), 0.0, footprint.levels - 1.0);
@@ -29,6 +45,7 @@ std::vector<BasisEntry> seen_field(const ShepardBasis& basis, const Footprint& f
         for (int k = l; k >= 0 && row.empty(); --k)
             basis.evaluate(k, y, row);
         if (row.empty()) basis.evaluate_or_nearest(l, y, row);
+        if (l + 1 == footprint.levels) weigh_by_reflectance(basis.points(), reflectance, row);
         drop_small_shares(row);
         for (const BasisEntry& entry : row)
             field.push_back({entry.index, static_cast<float>(weight) * entry.value});
@@ -59,7 +76,8 @@ MeanAndError irradiance_by_plain_gather(const Surface& surface, const ShepardBas
                 const double cosine = std::abs(surface.geometric_normal(hit).dot(direction));
                 Eigen::ArrayXd seen = Eigen::ArrayXd::Zero(functionals.cols());
                 for (const BasisEntry& entry :
-                     seen_field(basis, footprint, surface.point(hit), hit.distance, cosine))
+                     seen_field(basis, footprint, surface.point(hit), surface.reflectance(hit),
+                                hit.distance, cosine))
                     seen += entry.value * functionals.row(entry.index).transpose().array();
                 s += seen;
                 q += seen.square();

@@ -266,7 +266,9 @@ TEST(Links, BecomeFewerAndLessExactAsTheThresholdGrows) {
     options.threshold = 0.0f;
     LinkStatistics statistics;
     const Links all = example.links(options, 0.5f, &statistics);
-    EXPECT_EQ(statistics.links_before, all.count(0, all.rows()));
+    // All but differences that rounding alone has left: below 2^-32 nothing is stored.
+    EXPECT_LE(all.count(0, all.rows()), statistics.links_before);
+    EXPECT_GT(all.count(0, all.rows()), 0.999 * statistics.links_before);
     const Eigen::Matrix3Xd exact = example.field(all, coefficients);
     std::uint64_t last_count = all.count(0, all.rows());
     double last_error = 0.0;
