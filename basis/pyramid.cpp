@@ -2,8 +2,6 @@
 
 #include "core/parallel.h"
 
-#include <array>
-
 namespace afterglow {
 
 void Pyramid::analyse(const PointHierarchy& points, int levels, int channels,
@@ -46,13 +44,8 @@ PullOperator make_point_pull(const ShepardBasis& basis, int levels) {
             for (const BasisEntry& parent : parents)
                 rows[parent.index].push_back({child, parent.value});
         }
-        for (std::uint32_t k = points.begin(l); k < points.end(l); ++k) {
-            float sum = 0.0f;
-            for (const BasisEntry& child : rows[k])
-                sum += child.value;
-            for (BasisEntry& child : rows[k])
-                child.value /= sum;
-        }
+        for (std::uint32_t k = points.begin(l); k < points.end(l); ++k)
+            make_sum_one(rows[k]);
     }
     return {join_rows(std::move(rows))};
 }

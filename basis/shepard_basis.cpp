@@ -69,14 +69,18 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
     }
 }
 
-void drop_small_shares(std::vector<BasisEntry>& row) {
-    constexpr float least_share = 0.05f;
-    std::erase_if(row, [](const BasisEntry& entry) { return entry.value < least_share; });
+void make_sum_one(std::span<BasisEntry> row) {
     float sum = 0.0f;
     for (const BasisEntry& entry : row)
         sum += entry.value;
     for (BasisEntry& entry : row)
         entry.value /= sum;
+}
+
+void drop_small_shares(std::vector<BasisEntry>& row) {
+    constexpr float least_share = 0.05f;
+    std::erase_if(row, [](const BasisEntry& entry) { return entry.value < least_share; });
+    make_sum_one(row);
 }
 
 } // namespace afterglow

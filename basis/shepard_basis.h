@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 namespace afterglow {
@@ -44,6 +45,10 @@ private:
 
     bool wall_between(const SurfacePoint& x, std::uint32_t j) const;
 };
+
+/// Scales the shares of a row so that they sum to one; their sum must not be zero, unless there are
+/// none.
+void make_sum_one(std::span<BasisEntry> row);
 
 /// Most of the functions that reach a point hardly do: drops shares below a twentieth of a row that
 /// sums to one, and scales the others up. Rows that are used often are cut like this, half as long;

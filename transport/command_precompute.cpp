@@ -18,6 +18,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 namespace afterglow {
 namespace {
@@ -35,6 +36,19 @@ struct PrecomputeCommand {
 /// Wall-clock time of what happens around precompute().
 struct OuterSeconds {
     double load = 0.0, tree = 0.0, write = 0.0, total = 0.0;
+};
+
+/// Stored links, counted once: it takes a pass over them.
+struct LinkCounts {
+    std::vector<std::uint64_t> level;
+    std::uint64_t all = 0;
+
+    explicit LinkCounts(const TransferOperator& transfer) {
+        for (int l = 0; l < transfer.points.levels(); ++l) {
+            level.push_back(transfer.link_count(l));
+            all += level.back();
+        }
+    }
 };
 
 /// The seconds since `start`, which moves on to now.
@@ -65,7 +79,8 @@ Json options_json(const PrecomputeCommand& command) {
 }
 
 /// Counts and measures of length: nothing that differs from run to run.
-Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& report) {
+Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& report,
+                     const LinkCounts& links) {
     Json viewpoints = Json::array(), levels = Json::array();
     for (const Vec3& viewpoint : report.viewpoints)
         viewpoints.push_back(vector_json(viewpoint));
@@ -74,13 +89,13 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
         levels.push_back({{"functions", level.points},
                           {"candidates", level.candidates_tried},
                           {"largest_gap", level.largest_gap},
-                          {"links", transfer.link_count(l)}});
+                          {"links", links.level[static_cast<std::size_t>(l)]}});
     }
     return {{"viewpoints", viewpoints},
             {"mean_ray_length", report.mean_ray_length},
             {"levels", levels},
             {"senders", transfer.senders()},
-            {"links", transfer.link_count()},
+            {"links", links.all},
             {"threshold", std::stod(number_text(report.links.threshold))},
             {"links_before", report.links.links_before},
             {"rays_of_points", report.points_rays},
@@ -105,21 +120,22 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
 }
 
 void print_results(const PrecomputeCommand& command, const TransferOperator& transfer,
-                   const PrecomputeReport& report, const OuterSeconds& outer) {
+                   const PrecomputeReport& report, const LinkCounts& links,
+                   const OuterSeconds& outer) {
     const auto say = [](const char* format, auto... values) {
         std::fprintf(stderr, format, values...);
     };
     for (int l = 0; l < transfer.points.levels(); ++l) {
         const auto functions = transfer.points.end(l) - transfer.points.begin(l);
-        const std::uint64_t links = transfer.link_count(l);
+        const std::uint64_t of_level = links.level[static_cast<std::size_t>(l)];
         say("level %d: %u functions, spacing %.4g, %.1f links a function%s\n", l, functions,
             static_cast<double>(transfer.points.spacing[static_cast<std::size_t>(l)]),
-            static_cast<double>(links) / std::max(1u, functions),
+            static_cast<double>(of_level) / std::max(1u, functions),
             l < transfer.sender_levels ? ", senders too" : "");
     }
     say("%s: %.1f MB, %.3g links of %.3g, %.3g rays, %s\n", command.output.c_str(),
         static_cast<double>(std::filesystem::file_size(command.output)) * 1e-6,
-        static_cast<double>(transfer.link_count()),
+        static_cast<double>(links.all),
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
         duration_text(outer.total).c_str());
@@ -142,7 +158,9 @@ void run(PrecomputeCommand& command) {
     PrecomputeReport report;
     const TransferOperator transfer = precompute(surface, command.options, &report);
     lap(time);
-    const Json options = options_json(command), statistics = statistics_json(transfer, report);
+    const LinkCounts links(transfer);
+    const Json options = options_json(command);
+    const Json statistics = statistics_json(transfer, report, links);
     const std::string hash = scene.content_hash();
     save_transfer(command.output, transfer,
                   {AFTERGLOW_VERSION, command.scene, hash, command.options.seed, options.dump(),
@@ -162,7 +180,7 @@ void run(PrecomputeCommand& command) {
                            {"seconds", seconds_json(report, outer)}};
         write_text(command.report, json.dump(1) + "\n");
     }
-    if (!command.run.quiet) print_results(command, transfer, report, outer);
+    if (!command.run.quiet) print_results(command, transfer, report, links, outer);
 }
 
 /// Turns what was typed into PrecomputeOptions; throws UsageError for what cannot be.
@@ -208,7 +226,8 @@ void add_precompute_command(CLI::App& app) {
         add_number(*sub, "--target-error", command->target_error,
                    "Relative error of the indirect irradiance that dropped links may make "
                    "(default 0.1)");
-    add_number(*sub, "--epsilon", command->epsilon, "Instead: links below this size are dropped (default of --operator paper: 0.025/pi)")
+    add_number(*sub, "--epsilon", command->epsilon,
+               "Instead: links below this size are dropped (default of --operator paper: 0.025/pi)")
         ->excludes(target_error);
     sub->add_option("--operator", command->operator_name,
                     "neumann: one bounce, repeated at run time (default); paper: several bounces, "

@@ -23,10 +23,9 @@ struct GatherSample {
 };
 
 /// Which sender level a ray looks at: the finest whose spacing R_l is at least
-/// angle * distance / max(cos, 0.3), as a mip map would be read; between two levels a ray takes one, with
-/// probabilities linear in log R. The angle
-/// is a constant of the operator, not of the ray count, so that receivers and their parents resolve
-/// alike.
+/// angle * distance / max(cos, 0.3), as a mip map would be read; between two levels a ray takes one,
+/// with probabilities linear in log R. The angle is a constant of the operator, not of the ray count,
+/// so that receivers and their parents resolve alike.
 struct Footprint {
     float angle = 0.02f;
     float coarsest_spacing = 1.0f; // R_0 [world]

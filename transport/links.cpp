@@ -44,9 +44,8 @@ public:
     /// children. `parents`: the pushed rows of the level above, its first point first. Adds how many
     /// there were to `links_before`.
     void make(Index i, int level, std::span<const GatherSample> samples,
-                       std::span<const PushedRow> parents, const LevelThresholds& thresholds,
-                       std::vector<PackedLink>& kept, PushedRow& pushed,
-                       std::uint64_t& links_before) {
+              std::span<const PushedRow> parents, const LevelThresholds& thresholds,
+              std::vector<PackedLink>& kept, PushedRow& pushed, std::uint64_t& links_before) {
         gather(samples);
         difference_senders(thresholds.kept[0]);
         if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
@@ -261,11 +260,13 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
-        const LevelThresholds thresholds = level_thresholds(statistics.threshold, points, rows.levels(), l);
+        const LevelThresholds thresholds =
+            level_thresholds(statistics.threshold, points, rows.levels(), l);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
-        std::vector<std::uint64_t> links_before(static_cast<std::size_t>((batch + grain - 1) / grain));
+        std::vector<std::uint64_t> links_before(
+            static_cast<std::size_t>((batch + grain - 1) / grain));
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
             auto start = Clock::now();

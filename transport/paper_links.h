@@ -5,9 +5,6 @@
 #include "transport/links.h"
 #include "transport/rgb_links.h"
 
-#include <cstdint>
-#include <vector>
-
 namespace afterglow {
 
 /// Links of one bounce by the adaptive refinement as printed [LZT08, sec. 3.2, Fig. 5]:

@@ -23,28 +23,19 @@ public:
         : points_(points), sender_levels_(sender_levels), pyramid_(pyramid), pull_(pull),
           seen_(seen), functional_(points.end(sender_levels - 1)), sum_(functional_.size()) {}
 
-    /// Row i of T + T_0 P n. S, less what is below the threshold.
-    Row next(const Row& row_of_t, const std::vector<Row>& coarsest, const RgbLinks& others,
-             float threshold) {
+    /// The row of T + T_0 P n. S that belongs to a row of T_0, less what is below the threshold.
+    Row next(const Row& row_of_t, const std::vector<Row>& rows_of_s, float threshold) {
         std::fill(functional_.begin(), functional_.end(), RgbLink::Zero());
         std::fill(sum_.begin(), sum_.end(), RgbLink::Zero());
         for (const auto& link : row_of_t)
             functional_[link.index] = sum_[link.index] = link.value;
         analyse_transposed();
         pull_transposed();
-        for (std::uint32_t r = 0; r < points_.end(0); ++r) {
-            if (coarsest[r].empty()) continue;
+        for (std::uint32_t r = 0; r < points_.size(); ++r) {
+            if (rows_of_s[r].empty() || seen_.indices(r).empty()) continue;
             const Through through = at_receiver(r);
-            for (const auto& link : coarsest[r])
+            for (const auto& link : rows_of_s[r])
                 sum_[link.index] += product(through, link.value);
-        }
-        for (std::uint32_t r = points_.end(0); r < points_.size(); ++r) {
-            const auto sender = others.indices(r);
-            const auto value = others.values(r);
-            if (sender.empty() || seen_.indices(r).empty()) continue;
-            const Through through = at_receiver(r);
-            for (std::size_t e = 0; e < sender.size(); ++e)
-                sum_[sender[e]] += product(through, value[e]);
         }
         Row row;
         for (std::uint32_t j = 0; j < sum_.size(); ++j)
@@ -141,23 +132,17 @@ RgbLinks make_paper_series(RgbLinks links, const ShepardBasis& basis, int sender
     ScratchPool<RowProduct> products([&] {
         return std::make_unique<RowProduct>(points, sender_levels, pyramid, pull, seen);
     });
-    std::vector<Row> one_bounce, sum;
-    for (std::uint32_t i = 0; i < points.end(0); ++i)
-        one_bounce.push_back(row_of(links, i));
-    sum = one_bounce;
+    std::vector<Row> rows;
+    for (std::uint32_t i = 0; i < points.size(); ++i)
+        rows.push_back(row_of(links, i));
+    const std::vector<Row> rows_of_t(rows.begin(), rows.begin() + points.end(0));
     for (int bounce = 2; bounce <= bounces; ++bounce) {
-        std::vector<Row> next(sum.size());
+        std::vector<Row> next(rows_of_t.size());
         parallel_for(
             points.end(0),
-            [&](Index i) {
-                next[i] = products.borrow()->next(one_bounce[i], sum, links, threshold);
-            },
-            1);
-        sum = std::move(next);
+            [&](Index i) { next[i] = products.borrow()->next(rows_of_t[i], rows, threshold); }, 1);
+        std::move(next.begin(), next.end(), rows.begin());
     }
-    std::vector<Row> rows = std::move(sum);
-    for (std::uint32_t i = points.end(0); i < points.size(); ++i)
-        rows.push_back(row_of(links, i));
     return join_rows(std::move(rows));
 }
 

@@ -17,14 +17,11 @@ namespace {
 void favour_equal_reflectance(const PointHierarchy& points, const Rgb& at_y,
                               std::vector<BasisEntry>& row) {
     constexpr float scale2 = 0.1f * 0.1f, least = 1e-3f;
-    float sum = 0.0f;
     for (BasisEntry& entry : row) {
         const Rgb difference = points.reflectance.col(entry.index).array() - at_y;
         entry.value *= least + std::exp(-difference.square().mean() / scale2);
-        sum += entry.value;
     }
-    for (BasisEntry& entry : row)
-        entry.value /= sum;
+    make_sum_one(row);
 }
 
 } // namespace

@@ -189,17 +189,16 @@ private:
     }
 
     /// Fails unless the indices of every row in [first, last) rise strictly within [low, high).
-    template <class T>
-    void check_rows(const std::string& name, const SharedArray<std::uint64_t>& begin,
-                    std::span<const T> index, std::uint32_t first, std::uint32_t last,
-                    std::uint64_t low, std::uint64_t high) const {
+    template <class Value>
+    void check_rows(const std::string& name, const SparseRows<Value>& rows, std::uint32_t first,
+                    std::uint32_t last, std::uint64_t low, std::uint64_t high) const {
         parallel_ranges(last - first, 1024, [&](Index from, Index to) {
             for (Index row = first + from; row < first + to; ++row) {
                 std::int64_t before = static_cast<std::int64_t>(low) - 1;
                 bool good = true;
-                for (std::uint64_t k = begin[row]; k < begin[row + 1]; ++k) {
-                    good &= before < index[k];
-                    before = index[k];
+                for (const std::uint32_t index : rows.indices(row)) {
+                    good &= before < index;
+                    before = index;
                 }
                 if (!good || before >= static_cast<std::int64_t>(high))
                     fail("has indices '" + name + "' of which a row is unsorted or out of range");
@@ -209,51 +208,39 @@ private:
 
     void read_push(TransferOperator& transfer) const {
         const PointHierarchy& points = transfer.points;
-        SparseRows<float>& rows = transfer.push.parents;
-        const auto index = tensor<std::uint32_t>("push.index", {any_extent});
-        const auto value = tensor<float>("push.value", {index.size()});
-        rows.begin = read_begin("push.begin", points.size(), index.size());
-        check_rows("push.index", rows.begin, index, 0, points.end(0), 0, 0);
+        const SparseRows<float> rows = read_shares("push", points.size());
+        check_rows("push.index", rows, 0, points.end(0), 0, 0);
         for (int l = 1; l < points.levels(); ++l)
-            check_rows("push.index", rows.begin, index, points.begin(l), points.end(l),
+            check_rows("push.index", rows, points.begin(l), points.end(l),
                        points.begin(points.parent_level[l]), points.end(points.parent_level[l]));
-        check_shares("push", value);
-        rows.index = shared(index);
-        rows.value = shared(value);
+        transfer.push.parents = rows;
     }
 
     void read_pull(TransferOperator& transfer) const {
         const PointHierarchy& points = transfer.points;
-        SparseRows<float>& rows = transfer.pull.children;
-        const std::uint32_t pulled = points.begin(transfer.sender_levels - 1);
-        const auto index = tensor<std::uint32_t>("pull.index", {any_extent});
-        const auto value = tensor<float>("pull.value", {index.size()});
-        rows.begin = read_begin("pull.begin", pulled, index.size());
+        const SparseRows<float> rows =
+            read_shares("pull", points.begin(transfer.sender_levels - 1));
         for (int l = 0; l + 1 < transfer.sender_levels; ++l)
-            check_rows("pull.index", rows.begin, index, points.begin(l), points.end(l),
-                       points.begin(l + 1), points.end(l + 1));
-        check_shares("pull", value);
-        rows.index = shared(index);
-        rows.value = shared(value);
+            check_rows("pull.index", rows, points.begin(l), points.end(l), points.begin(l + 1),
+                       points.end(l + 1));
+        transfer.pull.children = rows;
     }
 
     void read_pyramid(TransferOperator& transfer) const {
         const PointHierarchy& points = transfer.points;
-        SparseRows<float>& rows = transfer.pyramid.coarser;
-        const auto index = tensor<std::uint32_t>("pyramid.index", {any_extent});
-        const auto value = tensor<float>("pyramid.value", {index.size()});
-        rows.begin = read_begin("pyramid.begin", transfer.senders(), index.size());
+        const SparseRows<float> rows = read_shares("pyramid", transfer.senders());
         for (int l = 0; l < transfer.sender_levels; ++l)
-            check_rows("pyramid.index", rows.begin, index, points.begin(l), points.end(l), 0,
-                       points.begin(l));
-        check_shares("pyramid", value);
-        rows.index = shared(index);
-        rows.value = shared(value);
+            check_rows("pyramid.index", rows, points.begin(l), points.end(l), 0, points.begin(l));
+        transfer.pyramid.coarser = rows;
     }
 
-    void check_shares(const std::string& name, std::span<const float> value) const {
+    /// Rows of shares; their indices are still to be checked.
+    SparseRows<float> read_shares(const std::string& name, std::uint64_t rows) const {
+        const auto index = tensor<std::uint32_t>(name + ".index", {any_extent});
+        const auto value = tensor<float>(name + ".value", {index.size()});
         if (!std::all_of(value.begin(), value.end(), [](float x) { return x >= 0.0f && x < 2.0f; }))
             fail("has a " + name + " weight that is no share");
+        return {read_begin(name + ".begin", rows, index.size()), shared(index), shared(value)};
     }
 
     void read_links(TransferOperator& transfer) const {
@@ -284,10 +271,9 @@ private:
         const auto value = tensor<float>("solution.value", {index.size(), 9});
         if (!std::all_of(value.begin(), value.end(), [](float x) { return std::isfinite(x); }))
             fail("has a link that is not finite");
-        links.begin = read_begin("solution.begin", points, index.size());
-        check_rows("solution.index", links.begin, index, 0, points, 0, transfer.senders());
-        links.index = shared(index);
-        links.value = {{reinterpret_cast<const RgbLink*>(value.data()), index.size()}, file_.map()};
+        links = {read_begin("solution.begin", points, index.size()), shared(index),
+                 {{reinterpret_cast<const RgbLink*>(value.data()), index.size()}, file_.map()}};
+        check_rows("solution.index", links, 0, points, 0, transfer.senders());
     }
 
     void read_provenance(TransferProvenance& provenance) const {
