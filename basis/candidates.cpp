@@ -15,9 +15,10 @@ constexpr int most_bounces = 30, skipped_bounces = 3;
 
 struct Outlook {
     double hit_share = 0.0, front_share = 0.0, mean_distance = 0.0;
-    /// Large where one looks far, at front sides, and little escapes. The winding of a scene may be
-    /// wrong as a whole, so back sides only weigh less.
-    double score() const { return hit_share * (0.1 + front_share) * mean_distance; }
+    /// Large where one looks far and little escapes.
+    double openness() const { return hit_share * mean_distance; }
+    /// Large where one looks at front sides too; single sheets may be wound the other way.
+    double score() const { return (0.1 + front_share) * openness(); }
 };
 
 Outlook look_around(const Surface& surface, const Vec3& from) {
@@ -67,6 +68,16 @@ std::vector<Vec3> find_viewpoints(const Surface& surface, std::uint64_t seed) {
         place[i] = box.min() + box.sizes().cwiseProduct(u);
         outlook[i] = look_around(surface, place[i]);
     });
+    // A scene may be wound the other way as a whole: then most of what one sees from open places, not
+    // from inside solids, are back sides.
+    double fronts = 0.0, backs = 0.0;
+    for (const Outlook& o : outlook) {
+        fronts += o.front_share * o.openness();
+        backs += (1.0 - o.front_share) * o.openness();
+    }
+    if (backs > 2.0 * fronts)
+        for (Outlook& o : outlook) o.front_share = 1.0 - o.front_share;
+
     std::vector<int> order(tried);
     for (int i = 0; i < tried; ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(),

@@ -11,6 +11,10 @@
 
 namespace afterglow {
 
+OpennessCode encode(const Openness& openness) {
+    return (64.0f * openness).array().round().max(-127.0f).min(127.0f).cast<std::int8_t>();
+}
+
 OpennessProbe::OpennessProbe(const Surface& surface, float spacing, int rays)
     : surface_(surface), spacing_(spacing), directions_(3, rays) {
     // Neighbouring directions share a ray packet: order by sector, then by height.

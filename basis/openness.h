@@ -5,9 +5,14 @@
 
 #include <Eigen/Core>
 
+#include <cmath>
+#include <cstdint>
+
 namespace afterglow {
 
 inline constexpr int openness_distances = 4;
+/// Of the probes whose features are compared: all must look the same ways.
+inline constexpr int openness_rays = 16;
 
 /// What a point sees of its near surroundings, at four distances D_k = R/16, R/4, R, 4R:
 ///
@@ -18,11 +23,16 @@ inline constexpr int openness_distances = 4;
 /// without a unit.
 using Openness = Eigen::Matrix<float, 3 * openness_distances, 1>;
 
+/// As it is kept, in steps of 1/64.
+using OpennessCode = Eigen::Matrix<std::int8_t, 3 * openness_distances, 1>;
+OpennessCode encode(const Openness& openness);
+inline Openness decode(const OpennessCode& code) { return code.cast<float>() / 64.0f; }
+
 /// Estimates the feature with `rays` short rays of length 16 R, the same directions about every
 /// normal, so that equal surroundings give equal features to the last bit of noise.
 class OpennessProbe {
 public:
-    OpennessProbe(const Surface& surface, float spacing, int rays);
+    OpennessProbe(const Surface& surface, float spacing, int rays = openness_rays);
     Openness operator()(const SurfacePoint& x) const;
     int rays() const { return static_cast<int>(directions_.cols()); }
 
@@ -33,6 +43,14 @@ private:
 };
 
 /// How different two points see the world: sum_k |F_k(x) - n_x - (F_k(y) - n_y)|^2.
-inline float openness_difference2(const Openness& a, const Openness& b) { return (a - b).squaredNorm(); }
+inline float openness_difference2(const Openness& a, const Openness& b) {
+    return (a - b).squaredNorm();
+}
+
+/// exp(-difference2 / s^2) with s = 0.15: how much of a value at one point is to be expected at the
+/// other.
+inline float openness_likeness(float difference2) {
+    return std::exp(difference2 * (-1.0f / (0.15f * 0.15f)));
+}
 
 } // namespace afterglow

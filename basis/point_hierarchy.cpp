@@ -9,14 +9,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <span>
 
 namespace afterglow {
 namespace {
 
 /// Supports of a level whose density varies: a function reaches 1.5 times as far as its fourth
-/// neighbour that faces about the same way, so that everywhere about as many overlap.
-std::vector<float> adaptive_supports(const std::vector<Candidate>& points, float spacing) {
-    constexpr int neighbour = 4, considered = 24;
+/// neighbour that faces about the same way, so that everywhere about as many overlap. Distances grow
+/// with the difference in openness as weights fall with it: along a contact a function reaches its
+/// like.
+std::vector<float> adaptive_supports(const std::vector<Candidate>& points,
+                                     std::span<const Openness> openness, float spacing) {
+    constexpr int neighbour = 4, considered = 48;
     Eigen::Matrix3Xf positions(3, points.size());
     for (std::size_t i = 0; i < points.size(); ++i) positions.col(i) = points[i].at.position;
     const NearestPoints nearest(positions);
@@ -29,11 +33,14 @@ std::vector<float> adaptive_supports(const std::vector<Candidate>& points, float
         for (const std::uint32_t j : near) {
             const Vec3& n = points[j].at.normal;
             if (j == static_cast<std::uint32_t>(i) || n.dot(x.normal) < 0.7f) continue;
-            distance.push_back(std::sqrt(squashed_distance2(points[j].at.position - x.position, n)));
+            const float d2 = squashed_distance2(points[j].at.position - x.position, n);
+            distance.push_back(std::sqrt(d2)
+                               / openness_likeness(openness_difference2(openness[j], openness[i])));
         }
         std::sort(distance.begin(), distance.end());
-        const float reach = distance.size() >= neighbour ? distance[neighbour - 1] : spacing;
-        support[i] = 1.5f * std::min(reach, 1.5f * spacing);
+        const float farthest = 1.5f * spacing;
+        const float reach = distance.size() >= neighbour ? distance[neighbour - 1] : farthest;
+        support[i] = 1.5f * std::min(reach, farthest);
     });
     return support;
 }
@@ -49,23 +56,36 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
     const int level_count = options.levels + (options.display ? 1 : 0);
     std::vector<std::vector<Candidate>> levels(level_count);
     std::vector<std::vector<float>> supports(level_count);
+    std::vector<OpennessCode> openness;
+    hierarchy.openness_level = level_count;
     for (int l = 0; l < level_count; ++l) {
         const DisplayLevel* display = l == options.levels ? &*options.display : nullptr;
         const float spacing = display ? display->spacing : std::ldexp(options.coarse_radius, -l);
-        const bool by_openness = display && display->openness_density > 0.0f;
+        const float density = display                      ? display->openness_density
+                              : l == options.levels - 1 ? options.finest_density
+                                                        : 0.0f;
+        const bool by_openness = density > 0.0f;
         PoissonDiskOptions disk_options;
         disk_options.spacing = spacing;
         disk_options.placement_power
             = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
-        disk_options.openness_density = by_openness ? display->openness_density : 0.0f;
+        disk_options.openness_density = density;
         const PoissonDisk disk = poisson_disk(source, disk_options);
 
+        std::vector<Openness> placed;
         std::vector<Vec3> positions;
         for (const Candidate& c : disk.points) positions.push_back(c.at.position);
-        for (const std::uint32_t i : morton_order(positions)) levels[l].push_back(disk.points[i]);
+        for (const std::uint32_t i : morton_order(positions)) {
+            levels[l].push_back(disk.points[i]);
+            if (by_openness) {
+                placed.push_back(disk.openness[i]);
+                openness.push_back(encode(disk.openness[i]));
+            }
+        }
         if (by_openness) {
-            supports[l] = adaptive_supports(levels[l], spacing);
+            hierarchy.openness_level = std::min(hierarchy.openness_level, l);
+            supports[l] = adaptive_supports(levels[l], placed, spacing);
         } else {
             const float t = level_count > 1 ? static_cast<float>(l) / (level_count - 1) : 0.0f;
             const float reach = std::lerp(options.shape.reach_coarsest, options.shape.reach_finest, t);
@@ -84,6 +104,9 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
     hierarchy.normal.resize(3, count);
     hierarchy.support.resize(count);
     hierarchy.reflectance.resize(3, count);
+    hierarchy.openness.resize(Eigen::NoChange, static_cast<Index>(openness.size()));
+    for (std::size_t k = 0; k < openness.size(); ++k)
+        hierarchy.openness.col(static_cast<Index>(k)) = openness[k];
     Index i = 0;
     for (int l = 0; l < level_count; ++l)
         for (std::size_t k = 0; k < levels[l].size(); ++k, ++i) {

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct PointHierarchy {
     std::vector<std::uint32_t> level_begin; // L + 1; level l is [level_begin[l], level_begin[l + 1])
     std::vector<float> spacing;             // L, the Poisson-disk radius R_l [world]
     std::vector<int> parent_level;          // L, the coarser level that predicts it; -1 for none
+    /// The levels from this one on were placed by openness, whose features their points have; L
+    /// or beyond where none was.
+    int openness_level = std::numeric_limits<int>::max();
+    Eigen::Matrix<std::int8_t, 3 * openness_distances, Eigen::Dynamic> openness; // OpennessCode each
     BasisShape shape;
 
     int levels() const { return static_cast<int>(spacing.size()); }
@@ -32,6 +37,9 @@ struct PointHierarchy {
     bool leads_to_display(int level) const {
         return level <= parent_level.back() || level + 1 == levels();
     }
+    Openness openness_of(Index i) const {
+        return decode(openness.col(i - begin(openness_level)));
+    }
     SurfacePoint point(Index i) const { return {position.col(i), normal.col(i)}; }
 };
 
@@ -39,12 +47,13 @@ struct PointHierarchy {
 struct DisplayLevel {
     float spacing = 0.0f;         // R on open ground [world]
     int parent = 0;               // the level that predicts it
-    float openness_density = 0.1f; // s of PoissonDiskOptions; 0 for a plain level
+    float openness_density = 0.15f; // s of PoissonDiskOptions; 0 for a plain level
 };
 
 struct HierarchyOptions {
     float coarse_radius = 0.0f; // R of level 0 [world]; halves from level to level
     int levels = 4;             // the display level not counted
+    float finest_density = 0.0f; // s of the finest of these, as a display level has one
     std::optional<DisplayLevel> display = {};
     BasisShape shape = {};
     bool skip_narrow = true; // on every level but an openness level

@@ -36,7 +36,7 @@ class DartBoard {
 public:
     DartBoard(const Surface& surface, const PoissonDiskOptions& options)
         : surface_(surface), options_(options),
-          probe_(surface, options.spacing, options.openness_rays) {}
+          probe_(surface, options.spacing) {}
 
     std::int32_t cell_of(const Vec3& x) {
         CellKey key;
@@ -190,7 +190,7 @@ PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& opti
         next += round;
         // Features cost rays, and narrow contacts are met seldom: past this rate another dart changes
         // little, and what remains is to leave no hole of size R.
-        if (refining && hits * 12 < round) {
+        if (refining && hits * 48 < round) {
             refining = false;
             failures = 0;
         }

@@ -19,7 +19,6 @@ struct PoissonDiskOptions {
     /// With a density s > 0, points may come as close as R/32 where the openness feature changes:
     /// y conflicts with x if D < R/32, or if D exp(|dF|^2 / (2 s^2)) < R.
     float openness_density = 0.0f;
-    int openness_rays = 16;
     std::size_t first_candidate = 0; // where in the source's sequence to begin
     int failures_to_end = 2000;      // the set is maximal once so many candidates failed in a row
 };

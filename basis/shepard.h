@@ -29,7 +29,9 @@ struct BasisShape {
     float reach_coarsest = 1.5f, reach_finest = 1.5f;
 
     /// As printed: cos^2 in both places, supports from 1.5 to 2.5 R.
-    static BasisShape paper() { return {2, 2, 2, 1.5f, 2.5f}; }
+    static BasisShape paper() {
+        return {.weight_power = 2, .placement_power = 2, .reach_finest = 2.5f};
+    }
 };
 
 /// max(0, c)^power for the small even powers in use.

@@ -7,6 +7,7 @@ namespace afterglow {
 namespace {
 
 constexpr float behind_a_wall = 1e-4f;
+constexpr float negligible = 1e-3f; // beside what is in sight
 
 } // namespace
 
@@ -16,6 +17,7 @@ ShepardBasis::ShepardBasis(const PointHierarchy& points, const Surface& surface,
         const Index begin = points.begin(l), count = points.end(l) - points.begin(l);
         tree_.emplace_back(points.position.middleCols(begin, count), points.support.segment(begin, count),
                            points.begin(l));
+        if (l >= points.openness_level) probe_.emplace_back(surface, points.spacing[l]);
         nearest_.push_back(std::make_unique<NearestPoints>(points.position.middleCols(begin, count)));
     }
 }
@@ -29,7 +31,6 @@ bool ShepardBasis::wall_between(const SurfacePoint& x, std::uint32_t j) const {
 
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
-    float sum = 0.0f;
     tree_[level].containing(x.position, [&](std::uint32_t j, float distance2) {
         const float cosine = x.normal.dot(points_.normal.col(j));
         if (cosine <= 0.0f) return;
@@ -38,20 +39,59 @@ void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisE
         const float d2 = distance2 + 8.0f * h * h;
         if (d2 >= r * r) return;
         const float w = kernel(std::sqrt(d2) / r) * cosine_power(cosine, points_.shape.weight_power);
-        if (!(w > 1e-12f)) return;
-        row.push_back({j, w});
-        sum += w;
+        if (w > 1e-12f) row.push_back({j, w});
     });
-    std::sort(row.begin() + first, row.end(),
+    if (row.size() - first > 1) {
+        const auto candidates = std::span(row).subspan(first);
+        if (level >= points_.openness_level) favour_equal_openness(level, x, candidates);
+        if (see_walls_) row.resize(first + hide_behind_walls(x, candidates));
+    }
+    const auto found = std::span(row).subspan(first);
+    std::sort(found.begin(), found.end(),
               [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
-    if (see_walls_ && row.size() > first + 1) {
-        sum = 0.0f;
-        for (std::size_t k = first; k < row.size(); ++k) {
-            if (wall_between(x, row[k].index)) row[k].value *= behind_a_wall;
-            sum += row[k].value;
+    make_sum_one(found);
+}
+
+void ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
+                                         std::span<BasisEntry> row) const {
+    // On open ground all see the same, and x too: no need to look.
+    const auto first = std::min_element(
+        row.begin(), row.end(),
+        [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
+    const Openness any = points_.openness_of(first->index);
+    const bool alike = std::all_of(row.begin(), row.end(), [&](const BasisEntry& entry) {
+        return openness_likeness(openness_difference2(points_.openness_of(entry.index), any)) > 0.98f;
+    });
+    if (alike) return;
+    const Openness here = probe_[static_cast<std::size_t>(level - points_.openness_level)](x);
+    for (BasisEntry& entry : row)
+        entry.value *=
+            1e-3f
+            + openness_likeness(openness_difference2(points_.openness_of(entry.index), here));
+}
+
+std::size_t ShepardBasis::hide_behind_walls(const SurfacePoint& x,
+                                            std::span<BasisEntry> row) const {
+    std::sort(row.begin(), row.end(), [](const BasisEntry& a, const BasisEntry& b) {
+        return a.value != b.value ? a.value > b.value : a.index < b.index;
+    });
+    float in_sight = 0.0f, hidden = 0.0f;
+    for (BasisEntry& entry : row) {
+        if (entry.value < negligible * in_sight) {
+            entry.value = 0.0f;
+        } else if (wall_between(x, entry.index)) {
+            hidden += entry.value;
+            entry.value *= -behind_a_wall; // its sign marks it
+        } else {
+            in_sight += entry.value;
         }
     }
-    for (std::size_t k = first; k < row.size(); ++k) row[k].value /= sum;
+    const bool enough = in_sight > 0.01f * hidden;
+    std::size_t kept = 0;
+    for (const BasisEntry& entry : row)
+        if (entry.value > 0.0f || (entry.value < 0.0f && !enough))
+            row[kept++] = {entry.index, std::abs(entry.value)};
+    return kept;
 }
 
 void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
@@ -60,9 +100,11 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
     evaluate(level, x, row);
     if (row.size() > first) return;
     std::vector<std::uint32_t> near;
+    const float farthest = 4.0f * points_.spacing[level];
     nearest_[level]->closest(x.position, 32, near);
     for (const std::uint32_t k : near) {
         const std::uint32_t j = points_.begin(level) + k;
+        if ((x.position - points_.position.col(j)).norm() > farthest) break; // closest first
         if (x.normal.dot(points_.normal.col(j)) <= 0.1f || wall_between(x, j)) continue;
         row.push_back({j, 1.0f});
         return;

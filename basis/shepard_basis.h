@@ -17,11 +17,17 @@ using BasisEntry = SparseEntry<float>; // a function and B_j(x)
 
 /// The functions of a hierarchy, to be evaluated anywhere: Shepard-normalised within a level,
 ///
-///     B_j(x) = w_j(x) / sum_k w_k(x),   w_j(x) = K(d_j(x) / r_j) max(0, n . n_j)^p v_j(x)
-///                                                            [LZT08, eqs. (2), (8)-(10)],
+///     B_j(x) = w_j(x) / sum_k w_k(x),   w_j(x) = K(d_j(x) / r_j) max(0, n . n_j)^p o_j(x) v_j(x)
+///                                                            [LZT08, eqs. (2), (8)-(10)].
 ///
-/// where v_j is 1, or 10^-4 where something stands between x and the function's centre (so that
-/// light does not leak through thin walls, and a level never loses a point it reaches).
+/// o_j: on levels placed by openness, 10^-3 + openness_likeness() of x and the function's centre: in
+/// a contact only what is in the contact too counts. x is probed where the functions that reach it
+/// differ among themselves; else o_j = 1.
+///
+/// v_j: 1, or 0 where something stands between x and the function's centre, so that light does not
+/// leak through walls however thin. Where functions in sight have less than a hundredth of the
+/// weight of those behind walls, 10^-4 instead of 0, so that a level never loses a point it reaches.
+/// Weights below a thousandth of those in sight are left out.
 /// One R-tree a level. Immutable; queries may run concurrently.
 class ShepardBasis {
 public:
@@ -32,8 +38,8 @@ public:
     /// Appends the functions of one level with B_j(x) > 0, by increasing id; they sum to 1, or there
     /// are none where the level does not cover x.
     void evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
-    /// As evaluate; where the level does not cover x, the closest function that faces the same side
-    /// and is not behind a wall gets all the weight. Still empty where there is none.
+    /// As evaluate; where the level does not cover x, the closest function within four times its
+    /// spacing that faces the same side and is not behind a wall gets all the weight. Still empty where there is none.
     void evaluate_or_nearest(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
 
 private:
@@ -42,7 +48,12 @@ private:
     bool see_walls_;
     std::vector<RTree> tree_;
     std::vector<std::unique_ptr<NearestPoints>> nearest_;
+    std::vector<OpennessProbe> probe_; // a level each, from PointHierarchy::openness_level on
 
+    /// Weights, not yet scaled to sum to one, times the openness term.
+    void favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
+    /// Weights times v_j. Sorts the row, largest first, and leaves what is kept at its begin.
+    std::size_t hide_behind_walls(const SurfacePoint& x, std::span<BasisEntry> row) const;
     bool wall_between(const SurfacePoint& x, std::uint32_t j) const;
 };
 

@@ -1,5 +1,6 @@
 #include "transport/precompute.h"
 
+#include "basis/poisson_disk.h"
 #include "core/error.h"
 #include "transport/paper_links.h"
 #include "transport/paper_series.h"
@@ -22,17 +23,35 @@ double seconds_since(Clock::time_point start) {
 /// default levels the finest senders are 1/25 of that length apart.
 constexpr float coarsest_share = 1.28f;
 
-HierarchyOptions hierarchy_options(const PrecomputeOptions& options, double mean_ray_length) {
+/// That spacing times this, 1 or less: so that the display level has at least 30 000 points on open
+/// ground in a scene of few surfaces too.
+float finer_for_few_surfaces(CandidateSource& source, float coarse_radius, int receiver_levels) {
+    constexpr double fewest = 30'000.0;
+    constexpr int counted_level = 2;
+    const PoissonDisk counted =
+        poisson_disk(source, {.spacing = std::ldexp(coarse_radius, -counted_level),
+                              .placement_power = BasisShape().placement_power});
+    const double expected = std::ldexp(static_cast<double>(counted.points.size()),
+                                       2 * (receiver_levels - 1 - counted_level));
+    return static_cast<float>(std::min(1.0, std::sqrt(expected / fewest)));
+}
+
+HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSource& source) {
     HierarchyOptions hierarchy;
-    hierarchy.coarse_radius = options.coarse_radius > 0.0f
-                                  ? options.coarse_radius
-                                  : coarsest_share * static_cast<float>(mean_ray_length);
     hierarchy.seed = options.seed;
+    hierarchy.coarse_radius = options.coarse_radius;
+    if (options.coarse_radius == 0.0f) {
+        hierarchy.coarse_radius = coarsest_share * static_cast<float>(source.mean_ray_length());
+        if (options.kind == OperatorKind::neumann)
+            hierarchy.coarse_radius *= finer_for_few_surfaces(source, hierarchy.coarse_radius,
+                                                              options.receiver_levels);
+    }
     if (options.kind == OperatorKind::paper) {
         hierarchy.levels = options.receiver_levels;
         hierarchy.shape = BasisShape::paper();
     } else {
         hierarchy.levels = std::max(options.receiver_levels - 1, options.sender_levels);
+        hierarchy.finest_density = options.sender_density;
         hierarchy.display = {std::ldexp(hierarchy.coarse_radius, 1 - options.receiver_levels),
                              options.receiver_levels - 2, options.openness_density};
     }
@@ -122,7 +141,7 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     transfer.sender_levels = options.sender_levels;
     transfer.bounces = options.bounces;
     transfer.points =
-        build_hierarchy(source, hierarchy_options(options, r.mean_ray_length), &r.hierarchy);
+        build_hierarchy(source, hierarchy_options(options, source), &r.hierarchy);
     r.points_seconds = seconds_since(start);
     r.points_rays = source.rays();
 

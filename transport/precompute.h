@@ -13,7 +13,8 @@ namespace afterglow {
 struct PrecomputeOptions {
     OperatorKind kind = OperatorKind::neumann;
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
-    float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length
+    float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length and how many
+                                   // points it takes
     /// Levels of receivers, spacing R, R/2, R/4 ...; the last is the display level.
     int receiver_levels = 6;
     /// Levels of senders, spaced alike; they share the points of the receivers' levels but the
@@ -22,7 +23,8 @@ struct PrecomputeOptions {
     int sender_levels = 5;
     LinkOptions links;
     int bounces = 0; // of indirect light; 0: all of them
-    float openness_density = 0.1f; // of the display level, see DisplayLevel
+    float openness_density = 0.15f; // of the display level, see DisplayLevel
+    float sender_density = 0.3f;   // of the finest regular level
     std::uint64_t seed = 1;
 
     /// For OperatorKind::paper, as printed [LZT08, secs. 2.3 and 4.2]: three levels of senders, four

@@ -19,7 +19,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* format_name = "afterglow transfer";
-constexpr const char* format_version = "2";
+constexpr const char* format_version = "3";
 
 static_assert(sizeof(PackedLink) == 3, "links are mapped as rows of three bytes");
 static_assert(sizeof(RgbLink) == 36, "links are mapped as rows of nine floats");
@@ -61,6 +61,7 @@ std::string model_text(const TransferOperator& transfer) {
                 {"sender_levels", transfer.sender_levels},
                 {"display_parent", transfer.points.parent_level.back()},
                 {"bounces", transfer.bounces},
+                {"openness_level", std::min(transfer.points.openness_level, transfer.points.levels())},
                 {"weight_power", transfer.points.shape.weight_power}}
         .dump();
 }
@@ -76,6 +77,7 @@ public:
         check_format();
         read_points(result.transfer.points);
         read_model(result.transfer);
+        read_openness(result.transfer.points);
         read_pull(result.transfer);
         if (result.transfer.kind == OperatorKind::paper) {
             read_pyramid(result.transfer);
@@ -161,7 +163,17 @@ private:
                 integer(model, "display_parent", paper ? levels - 2 : 0, levels - 2);
         transfer.bounces = integer(model, "bounces", paper ? 1 : 0, most_bounces);
         transfer.points.shape.weight_power = integer(model, "weight_power", 1, 1000);
+        transfer.points.openness_level = integer(model, "openness_level", 0, levels);
         if (transfer.senders() == 0) fail("has no senders");
+    }
+
+    void read_openness(PointHierarchy& points) const {
+        constexpr Index numbers = OpennessCode::RowsAtCompileTime;
+        const Index count = points.size() - points.level_begin[points.openness_level];
+        const auto codes = tensor<std::int8_t>(
+            "points.openness", {static_cast<std::uint64_t>(count), numbers});
+        points.openness =
+            Eigen::Map<const decltype(points.openness)>(codes.data(), numbers, count);
     }
 
     Json parse(const std::string& key) const {
@@ -327,6 +339,8 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
     add("points.normal", {count, 3}, values_of(points.normal));
     add("points.support", {count}, values_of(points.support));
     add("points.reflectance", {count, 3}, values_of(points.reflectance));
+    add("points.openness", {static_cast<std::uint64_t>(points.openness.cols()), OpennessCode::RowsAtCompileTime},
+        values_of(points.openness));
     add("level_begin", {levels + 1}, std::span(points.level_begin));
     add("spacing", {levels}, std::span(points.spacing));
     if (transfer.kind == OperatorKind::paper) {

@@ -119,17 +119,38 @@ TEST(CandidateSource, RefusesAViewpointFromWhichNoSurfaceIsReached) {
     EXPECT_THROW(CandidateSource(nothing, {Vec3::Zero()}, 1), Error);
 }
 
-TEST(FindViewpoints, FindsEveryRoom) {
-    const Scene scene = make_builtin_scene("builtin:two_rooms_closed");
-    const Surface surface(scene);
-    for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
-        bool first = false, second = false;
-        for (const Vec3& p : find_viewpoints(surface, seed)) {
-            EXPECT_TRUE(scene.bounds().contains(p));
-            first |= p.x() < 4.0f;
-            second |= p.x() > 4.05f;
+/// The scene with every triangle wound the other way.
+Scene reversed(Scene scene) {
+    for (Triangle& t : scene.triangles)
+        std::swap(t[1], t[2]);
+    return scene;
+}
+
+TEST(FindViewpoints, FindsEveryRoomHoweverTheSceneIsWound) {
+    const Scene good = make_builtin_scene("builtin:two_rooms_closed");
+    for (const Scene& scene : {good, reversed(good)}) {
+        const Surface surface(scene);
+        for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
+            bool first = false, second = false;
+            for (const Vec3& p : find_viewpoints(surface, seed)) {
+                EXPECT_TRUE(scene.bounds().contains(p));
+                first |= p.x() < 4.0f;
+                second |= p.x() > 4.05f;
+                EXPECT_TRUE(p.x() < 4.0f || p.x() > 4.05f) << "in the wall, seed " << seed;
+            }
+            EXPECT_TRUE(first && second) << "seed " << seed;
         }
-        EXPECT_TRUE(first && second) << "seed " << seed;
+    }
+}
+
+TEST(FindViewpoints, KeepsOutOfSolidsHoweverTheSceneIsWound) {
+    const Scene good = make_builtin_scene("builtin:cornell");
+    const Vec3 middle(0.278f, 0.45f, 0.28f); // in the open, above both blocks
+    for (const Scene& scene : {good, reversed(good)}) {
+        const Surface surface(scene);
+        for (const std::uint64_t seed : {1, 2, 3, 4, 5})
+            for (const Vec3& p : find_viewpoints(surface, seed))
+                EXPECT_FALSE(surface.blocked(p, middle)) << p.transpose() << ", seed " << seed;
     }
 }
 

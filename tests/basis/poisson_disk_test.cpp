@@ -140,7 +140,7 @@ TEST(PoissonDisk, CrowdsWhereTheOpennessChangesAndNowhereElse) {
             }
         EXPECT_GT(closest, 0.9999 * spacing / 32.0) << name;
         // The features are those of the points.
-        const OpennessProbe probe(surface, spacing, PoissonDiskOptions().openness_rays);
+        const OpennessProbe probe(surface, spacing);
         for (std::size_t i = 0; i < disk.points.size(); i += 50)
             EXPECT_LT(openness_difference2(disk.openness[i], probe(disk.points[i].at)), 1e-6f);
     }

@@ -81,32 +81,47 @@ TEST(ShepardBasis, SumsToOneWhereItCoversAndIsNeverNegative) {
 void expect_formula(const Example& example, bool see_walls, int count) {
     const ShepardBasis basis(example.points, example.surface, see_walls);
     std::vector<BasisEntry> row;
-    int walls = 0;
+    int walls = 0, unlike = 0;
     for (const SurfacePoint& x : places(example.scene, count, 6))
         for (int level = 0; level < 3; ++level) {
             row.clear();
             basis.evaluate(level, x, row);
-            const auto exact = shepard_by_formula(example.points, level, x,
-                                                  see_walls ? &example.surface : nullptr);
-            double missing = 1.0;
+            const auto exact =
+                shepard_by_formula(example.points, level, x, &example.surface, see_walls);
             if (exact.empty()) {
                 EXPECT_TRUE(row.empty());
                 continue;
             }
+            double kept = 0.0;
+            for (const BasisEntry& entry : row)
+                if (const auto at = exact.find(entry.index); at != exact.end()) kept += at->second;
+            auto left_out = exact;
             for (const BasisEntry& entry : row) {
                 const auto at = exact.find(entry.index);
                 const double value = at == exact.end() ? 0.0 : at->second;
-                EXPECT_NEAR(entry.value, value, 2e-5) << "at " << x.position.transpose();
-                missing -= value;
-                walls +=
-                    see_walls && behind_a_wall(example.points, example.surface, x, entry.index);
+                EXPECT_NEAR(entry.value, value / kept, 2e-5) << "at " << x.position.transpose();
+                left_out.erase(entry.index);
             }
-            // What the row leaves out weighs nothing.
-            EXPECT_NEAR(missing, 0.0, 1e-5) << "at " << x.position.transpose();
+            // What the row leaves out hardly weighs anything.
+            for (const auto& [j, value] : left_out)
+                EXPECT_LT(value, see_walls ? 1.01e-3 : 1e-5) << "at " << x.position.transpose();
+            EXPECT_GT(kept, see_walls ? 0.98 : 0.9999);
+            if (see_walls)
+                for (const auto& [j, value] : shepard_by_formula(example.points, level, x,
+                                                                 &example.surface, false))
+                    walls += value > 0.05 && !exact.contains(j);
+            if (level == 2) {
+                const auto blind = shepard_by_formula(example.points, level, x, nullptr);
+                const auto alone = shepard_by_formula(example.points, level, x, &example.surface, false);
+                for (const auto& [j, value] : blind)
+                    unlike += std::abs(value - alone.at(j)) > 0.1;
+            }
         }
     if (see_walls) {
-        EXPECT_GT(walls, 20) << "no walls met: the test shows nothing";
+        EXPECT_GT(walls, 5) << "no walls met: the test shows nothing";
     }
+    EXPECT_EQ(example.points.openness_level, 2);
+    EXPECT_GT(unlike, count / 10) << "openness hardly matters: the test shows nothing";
 }
 
 TEST(ShepardBasis, IsItsFormula) {

@@ -106,6 +106,7 @@ void add_measure_options(CLI::App& command, MeasureOptions& options) {
     command.add_option("--receiver-levels", p.receiver_levels);
     command.add_option("--sender-levels", p.sender_levels);
     command.add_option("--openness-density", p.openness_density);
+    command.add_option("--sender-density", p.sender_density);
     command.add_option("--seed", p.seed);
     command.add_flag("--time-rays", options.time_rays,
                      "Trace the gather rays once more, with nothing else, for the ray ratio");

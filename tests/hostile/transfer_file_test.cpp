@@ -274,8 +274,8 @@ TEST(HostileTransferFile, SizesThatDoNotAgreeAreRefused) {
         {"other type", [](Parts& p) { p.tensor("points.support").dtype = DType::u32; }},
     };
     for (const char* name :
-         {"points.position", "points.normal", "points.support", "points.reflectance", "level_begin",
-          "spacing", "push.begin", "push.index", "push.value", "pull.begin", "pull.index",
+         {"points.position", "points.normal", "points.support", "points.reflectance",
+          "points.openness", "level_begin", "spacing", "push.begin", "push.index", "push.value", "pull.begin", "pull.index",
           "pull.value", "links.begin", "links.packed"}) {
         damages[std::string(name) + " is short"] = [=](Parts& p) {
             p.shorten(name, p.tensor(name).shape[0] - 1);
@@ -296,7 +296,7 @@ TEST(HostileTransferFile, MetadataThatMakesNoSenseIsRefused) {
     };
     std::map<std::string, Damage> damages = {
         {"another format", metadata("format", "something else")},
-        {"another version", metadata("format_version", "1")},
+        {"another version", metadata("format_version", "2")},
         {"seed of letters", metadata("seed", "one")},
         {"seed and more", metadata("seed", "1 ")},
         {"no path", metadata("scene", "")},
@@ -319,6 +319,8 @@ TEST(HostileTransferFile, MetadataThatMakesNoSenseIsRefused) {
          model("\"sender_levels\":2", "\"sender_levels\":18446744073709551615")},
         {"bounces negative", model("\"bounces\":0", "\"bounces\":-1")},
         {"bounces endless", model("\"bounces\":0", "\"bounces\":2000000000")},
+        {"openness from another level", model("\"openness_level\":1", "\"openness_level\":2")},
+        {"openness from beyond", model("\"openness_level\":1", "\"openness_level\":4")},
         {"weight power negative", model("\"weight_power\":", "\"weight_power\":-")},
         {"weight power beyond numbers", model("\"weight_power\":", "\"weight_power\":1e999")},
     };

@@ -13,9 +13,9 @@ bool behind_a_wall(const PointHierarchy& points, const Surface& surface, const S
 }
 
 std::map<std::uint32_t, double> shepard_by_formula(const PointHierarchy& points, int level,
-                                                   const SurfacePoint& x, const Surface* surface) {
-    std::map<std::uint32_t, double> weight;
-    double sum = 0.0;
+                                                   const SurfacePoint& x, const Surface* surface,
+                                                   bool see_walls) {
+    std::map<std::uint32_t, double> all;
     for (std::uint32_t j = points.begin(level); j < points.end(level); ++j) {
         const Eigen::Vector3d offset =
             x.position.cast<double>() - points.position.col(j).cast<double>();
@@ -24,12 +24,37 @@ std::map<std::uint32_t, double> shepard_by_formula(const PointHierarchy& points,
         const double h = offset.dot(n);
         const double t = std::sqrt(offset.squaredNorm() + 8.0 * h * h) / points.support[j];
         if (cosine <= 0.0 || t >= 1.0) continue;
-        double w =
+        const double w =
             (2.0 * t * t * t - 3.0 * t * t + 1.0) * std::pow(cosine, points.shape.weight_power);
-        if (surface && behind_a_wall(points, *surface, x, j)) w *= 1e-4;
-        weight[j] = w;
-        sum += w;
+        all[j] = w;
     }
+    if (surface && level >= points.openness_level && all.size() > 1) {
+        const auto difference2 = [&](std::uint32_t j, const Openness& feature) {
+            const auto code = points.openness.col(j - points.begin(points.openness_level));
+            return static_cast<double>((code.cast<float>() / 64.0f - feature).squaredNorm());
+        };
+        const Openness first = points.openness_of(all.begin()->first);
+        const bool alike = std::all_of(all.begin(), all.end(), [&](const auto& function) {
+            return difference2(function.first, first) < 0.0225 * std::log(1.0 / 0.98);
+        });
+        const Openness here = OpennessProbe(*surface, points.spacing[level])(x);
+        for (auto& [j, w] : all)
+            if (!alike) w *= 1e-3 + std::exp(-difference2(j, here) / 0.0225);
+    }
+    std::map<std::uint32_t, double> weight, hidden;
+    double in_sight = 0.0, behind_walls = 0.0;
+    for (const auto& [j, w] : all) {
+        const bool is_hidden =
+            surface && see_walls && all.size() > 1 && behind_a_wall(points, *surface, x, j);
+        (is_hidden ? hidden : weight)[j] = w;
+        (is_hidden ? behind_walls : in_sight) += w;
+    }
+    if (in_sight <= 0.01 * behind_walls)
+        for (const auto& [j, w] : hidden)
+            weight[j] = 1e-4 * w;
+    double sum = 0.0;
+    for (const auto& [j, w] : weight)
+        sum += w;
     for (auto& [j, w] : weight)
         w /= sum;
     return weight;
