@@ -36,7 +36,9 @@ Spotlight light_towards(const Vec3& position, const Vec3& target, float angle = 
     return light;
 }
 
-Spotlight room_lamp() { return light_towards({3.6f, 2.5f, 2.6f}, {2.6f, 0.0f, 1.8f}); }
+Spotlight room_lamp() {
+    return light_towards({3.6f, 2.5f, 2.6f}, {2.6f, 0.0f, 1.8f});
+}
 
 // Of the rack and the stairs.
 const Vec3 rack_corner(2.0f, 0.1f, 0.0f);
@@ -62,8 +64,10 @@ std::vector<SurfacePoint> places_on(const Quad& quad, int count, std::uint64_t s
     std::vector<SurfacePoint> places;
     for (int i = 0; i < columns * rows; ++i) {
         Rng rng(seed, static_cast<std::uint64_t>(i));
-        const float s = (static_cast<float>(i % columns) + rng.uniform()) / static_cast<float>(columns);
-        const float t = (static_cast<float>(i / columns) + rng.uniform()) / static_cast<float>(rows);
+        const float s =
+            (static_cast<float>(i % columns) + rng.uniform()) / static_cast<float>(columns);
+        const float t =
+            (static_cast<float>(i / columns) + rng.uniform()) / static_cast<float>(rows);
         places.push_back({quad.corner + s * quad.u + t * quad.v, quad.normal()});
     }
     return places;
@@ -82,9 +86,9 @@ void SceneBuilder::add_triangle(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 void SceneBuilder::add(const Quad& quad) {
     const auto first = static_cast<std::uint32_t>(scene_.positions.size());
-    scene_.positions.insert(scene_.positions.end(),
-                            {quad.corner, quad.corner + quad.u, quad.corner + quad.u + quad.v,
-                             quad.corner + quad.v});
+    scene_.positions.insert(
+        scene_.positions.end(),
+        {quad.corner, quad.corner + quad.u, quad.corner + quad.u + quad.v, quad.corner + quad.v});
     scene_.triangles.push_back({first, first + 1, first + 2});
     scene_.triangles.push_back({first, first + 2, first + 3});
     scene_.material_index.insert(scene_.material_index.end(), 2, 0);
@@ -150,8 +154,8 @@ LitScene shelves(float gap) {
     SceneBuilder builder;
     builder.add_room(Vec3::Zero(), room_size);
     for (int i = 0; i < boards(gap); ++i) {
-        const Vec3 corner =
-            rack_corner + static_cast<float>(i) * (gap + board) * Vec3::UnitY() - seal * Vec3::UnitZ();
+        const Vec3 corner = rack_corner + static_cast<float>(i) * (gap + board) * Vec3::UnitY()
+                            - seal * Vec3::UnitZ();
         builder.add_box(corner, corner + Vec3(rack_width, board, rack_depth + seal));
     }
     return {builder.finish({2.5f, 1.4f, 2.5f}), room_lamp()};
@@ -256,7 +260,8 @@ LitScene clutter(int count, float area, std::uint64_t seed) {
         const float turn = 2.0f * static_cast<float>(EIGEN_PI) * rng.uniform();
         std::array<Vec3, 3> corner;
         for (int k = 0; k < 3; ++k) {
-            const float angle = turn + 2.0f * static_cast<float>(EIGEN_PI) / 3.0f * static_cast<float>(k);
+            const float angle =
+                turn + 2.0f * static_cast<float>(EIGEN_PI) / 3.0f * static_cast<float>(k);
             corner[k] = centre + r * (std::cos(angle) * frame.x + std::sin(angle) * frame.y);
         }
         builder.add_triangle(corner[0], corner[1], corner[2]);

@@ -85,8 +85,8 @@ LitScene box_in_room(float wall, bool lid, LightAt light);
 /// The inner sides of the box, the lid's not among them.
 std::vector<Quad> inside_of_box();
 
-/// `count` triangles of random place and direction in a room of 5 x 2.8 x 4 m, all of one size; half
-/// of their sides together (both sides count) are `area` [m^2].
+/// `count` triangles of random place and direction in a room of 5 x 2.8 x 4 m, all of one size;
+/// half of their sides together (both sides count) are `area` [m^2].
 LitScene clutter(int count, float area, std::uint64_t seed);
 
 /// A corridor 2 m wide and high, x in [0, length], the light at its end x = 0.
