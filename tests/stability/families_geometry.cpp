@@ -82,9 +82,9 @@ Places in_dark_room(const Surface& surface, float wall) {
     return places;
 }
 
-Figures measure_closed_wall(double percent_of_radius) {
+Figures measure_closed_wall(double percent_of_radius, Shell shell) {
     const float wall = static_cast<float>(percent_of_radius) / 100.0f * rooms_radius;
-    LitScene lit = two_rooms(wall, 0.0f);
+    LitScene lit = two_rooms(wall, 0.0f, shell);
     const Precomputed rooms(std::move(lit.scene));
     const Eigen::Array3Xf dark = rooms.indirect(lit.light, in_dark_room(rooms.surface(), wall));
     const double lit_mean = rooms.indirect(lit.light, in_view(rooms)).mean();
@@ -294,7 +294,14 @@ std::vector<Family> geometry_families() {
          "wall [% of R]",
          {0.1, 0.3, 1, 3, 10, 30, 50},
          [=](double wall) { return measure_door(as_float(wall) / 100.0f * rooms_radius, 0.9f); }},
-        {"wall_closed", "wall [% of R]", {0, 0.1, 0.3, 1, 3, 10, 30, 50}, measure_closed_wall},
+        {"wall_closed",
+         "wall [% of R]",
+         {0, 0.1, 0.3, 1, 3, 10, 30, 50},
+         [](double wall) { return measure_closed_wall(wall, Shell::parted); }},
+        {"wall_closed_floor_through",
+         "wall [% of R]",
+         {0, 0.1, 0.3, 1, 3, 10, 30, 50},
+         [](double wall) { return measure_closed_wall(wall, Shell::continuous); }},
         {"door",
          "door [m]",
          {0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0},

@@ -118,12 +118,26 @@ Scene SceneBuilder::finish(const Vec3& viewpoint) {
     return std::move(scene_);
 }
 
-LitScene two_rooms(float wall, float door_width) {
+LitScene two_rooms(float wall, float door_width, Shell shell) {
     constexpr float height = 2.8f, depth = 4.0f, length = 4.0f, door_height = 2.0f;
     const float left = 0.5f * (depth - door_width), right = 0.5f * (depth + door_width);
     const float end = length + wall;
     SceneBuilder builder;
-    builder.add_room({0, 0, 0}, {end + length, height, depth});
+    if (shell == Shell::continuous) {
+        builder.add_room({0, 0, 0}, {end + length, height, depth});
+    } else {
+        for (int axis = 0; axis < 3; ++axis)
+            for (const bool upper : {false, true}) {
+                const bool is_end = axis == 0;
+                if (!(is_end && upper))
+                    builder.add(face({0, 0, 0}, {length, height, depth}, axis, upper).flipped());
+                if (!(is_end && !upper))
+                    builder.add(
+                        face({end, 0, 0}, {end + length, height, depth}, axis, upper).flipped());
+            }
+        if (door_width > 0.0f && wall > 0.0f) // the threshold
+            builder.add({{length, 0, left}, {0, 0, door_width}, {wall, 0, 0}});
+    }
     if (door_width > 0.0f) {
         builder.add_wall({length, -seal, -seal}, {end, height + seal, left});
         builder.add_wall({length, -seal, right}, {end, height + seal, depth + seal});

@@ -53,9 +53,13 @@ struct LitScene {
 // The families' scenes. Walls inside a room reach a little into its shell, so that no light gets
 // past their edges.
 
+/// Whether floor, ceiling and side walls are made of quads that end at the wall between two rooms,
+/// or run through below it.
+enum class Shell { parted, continuous };
+
 /// Two rooms of 4 x 2.8 x 4 m, x in [0, 4] and [4 + wall, 8 + wall], the light in the first. The
 /// door, 2 m high, is in the middle of the wall; none where its width is zero.
-LitScene two_rooms(float wall, float door_width);
+LitScene two_rooms(float wall, float door_width, Shell shell = Shell::parted);
 
 /// A cube of 5 m with a square sheet, one quad that faces up like the floor, `distance` above the
 /// middle of the floor. The light falls on the sheet from above.
