@@ -24,6 +24,11 @@ Eigen::Array3Xf Precomputed::indirect(const Spotlight& light,
     return irradiance;
 }
 
+Comparison Comparison::part(Index first, Index count) const {
+    return {indirect.middleCols(first, count), reference.middleCols(first, count),
+            standard_error.middleCols(first, count)};
+}
+
 double Comparison::rel_rmse(double mean) const {
     const double square = (indirect - reference).cast<double>().square().mean()
                           - standard_error.cast<double>().square().mean();
@@ -38,7 +43,7 @@ Comparison compare(const Precomputed& precomputed, const Spotlight& light,
                    std::span<const SurfacePoint> places, double target_error) {
     PathTracerOptions options;
     options.target_error = target_error;
-    options.max_samples = 1 << 16;
+    options.max_samples = 1 << 13;
     options.seed = 17;
     options.strategy = PathStrategy::connected;
     IrradianceEstimate reference =

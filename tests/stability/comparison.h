@@ -33,6 +33,9 @@ struct Comparison {
     Eigen::Array3Xf indirect, reference; // 3 x places [W/m^2]
     Eigen::Array3Xf standard_error;      // of the reference
 
+    /// Of the places [first, first + count).
+    Comparison part(Index first, Index count) const;
+
     double reference_mean() const { return reference.cast<double>().mean(); }
     /// Root mean square error relative to a mean irradiance, the reference's variance subtracted; 0
     /// where that leaves nothing.
@@ -44,7 +47,8 @@ struct Comparison {
     double reference_error() const;
 };
 
-/// target_error: of the reference, relative; tracing gives up at a mean of 2^16 paths a place.
+/// target_error: of the reference, relative; tracing gives up at a mean of 2^13 paths a place,
+/// which is told by reference_error().
 Comparison compare(const Precomputed& precomputed, const Spotlight& light,
                    std::span<const SurfacePoint> places, double target_error = 0.02);
 

@@ -98,20 +98,16 @@ Figures measure_closed_wall(double percent_of_radius, Shell shell) {
 Figures measure_sheet(float side, float distance) {
     LitScene lit = sheet_above_floor(side, distance);
     const Precomputed room(std::move(lit.scene));
-    const double scene_mean = compare(room, lit.light, in_view(room), 0.02).reference_mean();
-    const std::vector<Quad> covered = covered_by_sheet(side, distance);
+    const double scene_mean = compare(room, lit.light, in_view(room)).reference_mean();
+    const Places covered = places_on_all(covered_by_sheet(side, distance), 500);
+    const Comparison both = compare(room, lit.light, covered);
+    const auto half = static_cast<Index>(covered.size() / 2);
     Figures figures{{"distance / R", distance / room.coarse_radius()}};
-    Places both;
-    for (std::size_t k = 0; k < covered.size(); ++k) {
-        const Places some = places_on(covered[k], 250, k);
-        both.insert(both.end(), some.begin(), some.end());
-        const Comparison one = compare(room, lit.light, some);
-        figures.push_back(percent(k == 0 ? "floor relRMSE" : "underside relRMSE", one.rel_rmse()));
-    }
-    const Comparison comparison = compare(room, lit.light, both);
-    append(figures, "both", comparison);
-    figures.push_back(percent("of the scene's mean", comparison.rel_rmse(scene_mean)));
-    figures.push_back(percent("covered / scene's mean", comparison.reference_mean() / scene_mean));
+    append(figures, "covered", both);
+    figures.push_back(percent("floor relRMSE", both.part(0, half).rel_rmse()));
+    figures.push_back(percent("underside relRMSE", both.part(half, half).rel_rmse()));
+    figures.push_back(percent("of the scene's mean", both.rel_rmse(scene_mean)));
+    figures.push_back(percent("covered / scene's mean", both.reference_mean() / scene_mean));
     return figures;
 }
 

@@ -16,6 +16,7 @@ Figure percent(const std::string& name, double share) {
 
 void report(const Family& family, const std::string& folder) {
     std::printf("%s\n", family.name.c_str());
+    std::fflush(stdout);
     std::ostringstream csv;
     bool is_first = true;
     for (const double value : family.values) {
