@@ -193,7 +193,7 @@ Figures measure_furnace(double rho) {
     const Precomputed box(make_builtin_scene(with_reflectance("furnace", rho)));
     const double box_mean =
         box.indirect(everywhere, points_by_area(box.scene(), 20000, 3)).cast<double>().mean();
-    const Comparison in_box = compare(box, everywhere, points_by_area(box.scene(), 300, 4), 0.005);
+    const Comparison in_box = compare(box, everywhere, points_by_area(box.scene(), 300, 4), 0.01);
 
     const Spotlight in_the_middle{.inner_angle = 180.0f, .outer_angle = 180.0f};
     const Precomputed sphere(make_builtin_scene(with_reflectance("sphere", rho)));
