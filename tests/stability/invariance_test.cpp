@@ -40,20 +40,21 @@ TEST(Invariance, TheSameSurfacesOtherwiseDescribedGiveTheSameLight) {
     const Scene scene = make_room();
     const Setting small_unit = scaled(
         room_as(with_flat_normals(
-            with_coplanar_faces(duplicated(with_other_diagonals(scene), true)), 1.0f, 2)),
+            with_coplanar_faces(duplicated(with_other_diagonals(scene), 1.0f), 1.0f), 1.0f, 0.5f)),
         1e-3f);
     const Setting large_unit =
         scaled(room_as(with_flat_normals(
-                   split_in_four(make_room({.overhang = 0.5f, .sunken = 0.2f})), -1.0f)),
+                   split_in_four(make_room({.overhang = 0.5f, .sunken = 0.2f})), -1.0f,
+                   1.0f)),
                1e5f);
     const Setting far_millimetres =
-        shifted(scaled(room_as(flipped_at_random(with_t_junctions(scene, 1), 2)), 1e3f),
+        shifted(scaled(room_as(flipped(with_t_junctions(scene, 0.5f), 0.5f)), 1e3f),
                 Vec3(1e6f, -1e6f, 1e6f));
 
     const OfSeeds base = indirect_of_seeds(room(), 1, 3);
     for (const auto& [name, setting] : {
              std::pair<std::string, Setting>{
-                 "x 1e-3, other diagonals, faces duplicated and coplanar, normals at every other",
+                 "x 1e-3, other diagonals, faces duplicated and coplanar, half the normals",
                  small_unit},
              {"x 1e5, cut in four, walls and furniture cross, normals the wrong way", large_unit},
              {"millimetres shifted by 1e6, T-junctions, flipped at random", far_millimetres},

@@ -74,6 +74,11 @@ Scene make_room(const RoomShape& shape) {
     return scene;
 }
 
+void add_board(Scene& room, const Vec3& middle, float side) {
+    const Vec3 half(0.5f * side, 0.005f, 0.5f * side);
+    add_box(room, middle - half, middle + half, 0.0f, true, true, 0);
+}
+
 Spotlight room_light() {
     Spotlight light{.position = Vec3(2.3f, 2.6f, 1.9f),
                     .direction = Vec3(0.1f, -1.0f, -0.1f),

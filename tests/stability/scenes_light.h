@@ -20,6 +20,9 @@ struct RoomShape {
 
 Scene make_room(const RoomShape& shape = {});
 
+/// A level square board of the given side, 1 cm thick, white, about `middle`.
+void add_board(Scene& room, const Vec3& middle, float side);
+
 /// Hangs in the room below its ceiling and shines down, on the table as well as on the floor.
 Spotlight room_light();
 

@@ -36,6 +36,12 @@ private:
     Scene scene_;
 };
 
+/// Whether triangle t belongs to the treated share.
+bool chosen(std::size_t t, float share) {
+    constexpr std::uint64_t seed = 0x7265;
+    return Rng(seed, t).uniform() < share;
+}
+
 } // namespace
 
 Setting scaled(Setting setting, float factor) {
@@ -84,73 +90,62 @@ Scene split_in_four(const Scene& scene) {
     return mesh.finish();
 }
 
-Scene with_t_junctions(const Scene& scene, std::uint64_t seed) {
+Scene with_t_junctions(const Scene& scene, float share) {
+    constexpr std::uint64_t seed = 0x6a75;
     Remeshed mesh(scene);
     for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
         const Vec3 &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
-        if (t % 2 == 0) {
+        if (chosen(t, share)) {
+            const Vec3 between = a + (0.2f + 0.6f * Rng(seed, t).uniform()) * (b - a);
+            mesh.add(a, between, c, t);
+            mesh.add(between, b, c, t);
+        } else {
             mesh.add(a, b, c, t);
-            continue;
         }
-        const Vec3 between = a + (0.2f + 0.6f * Rng(seed, t).uniform()) * (b - a);
-        mesh.add(a, between, c, t);
-        mesh.add(between, b, c, t);
     }
     return mesh.finish();
 }
 
-Scene duplicated(const Scene& scene, bool turned_over) {
+Scene duplicated(const Scene& scene, float share) {
     Remeshed mesh(scene);
     for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
         const Vec3 &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
         mesh.add(a, b, c, t);
-        if (turned_over)
-            mesh.add(a, c, b, t);
-        else
-            mesh.add(a, b, c, t);
+        if (chosen(t, share)) mesh.add(a, c, b, t);
     }
     return mesh.finish();
 }
 
-Scene with_coplanar_faces(const Scene& scene) {
+Scene with_coplanar_faces(const Scene& scene, float share) {
     Remeshed mesh(scene);
     for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
         const Vec3 &a = mesh.corner(t, 0), &b = mesh.corner(t, 1), &c = mesh.corner(t, 2);
         mesh.add(a, b, c, t);
         const Vec3 middle = (a + b + c) / 3.0f;
-        mesh.add(0.5f * (a + middle), 0.5f * (b + middle), 0.5f * (c + middle), t);
+        if (chosen(t, share))
+            mesh.add(0.5f * (a + middle), 0.5f * (b + middle), 0.5f * (c + middle), t);
     }
     return mesh.finish();
 }
 
-Scene flipped(const Scene& scene) {
-    Remeshed mesh(scene);
+Scene flipped(const Scene& scene, float share) {
+    Scene result = scene;
     for (std::size_t t = 0; t < scene.triangles.size(); ++t)
-        mesh.add(mesh.corner(t, 0), mesh.corner(t, 2), mesh.corner(t, 1), t);
-    return mesh.finish();
+        if (chosen(t, share)) std::swap(result.triangles[t][1], result.triangles[t][2]);
+    return result;
 }
 
-Scene flipped_at_random(const Scene& scene, std::uint64_t seed) {
-    Remeshed mesh(scene);
-    for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
-        const bool turn = Rng(seed, t).uniform() < 0.5f;
-        mesh.add(mesh.corner(t, 0), mesh.corner(t, turn ? 2 : 1), mesh.corner(t, turn ? 1 : 2), t);
-    }
-    return mesh.finish();
-}
-
-Scene with_flat_normals(const Scene& scene, float sign, std::size_t step) {
+Scene with_flat_normals(const Scene& scene, float sign, float share) {
     Scene result = scene;
     result.normals.clear();
     result.normal_indices.clear();
     for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
-        const Triangle& corner = scene.triangles[t];
-        const Vec3& a = scene.positions[corner[0]];
+        const auto [a, b, c] = scene.triangles[t];
+        const Vec3& origin = scene.positions[a];
+        const Vec3 normal = (scene.positions[b] - origin).cross(scene.positions[c] - origin);
         const auto n = static_cast<std::uint32_t>(result.normals.size());
-        result.normals.push_back(
-            sign
-            * (scene.positions[corner[1]] - a).cross(scene.positions[corner[2]] - a).normalized());
-        if (t % step == 0)
+        result.normals.push_back(sign * normal.normalized());
+        if (chosen(t, share))
             result.normal_indices.push_back({n, n, n});
         else
             result.normal_indices.push_back({no_index, no_index, no_index});

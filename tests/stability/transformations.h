@@ -3,7 +3,6 @@
 #include "core/scene.h"
 #include "transport/spotlight.h"
 
-#include <cstdint>
 #include <vector>
 
 namespace afterglow {
@@ -23,24 +22,21 @@ Setting scaled(Setting setting, float factor);
 Setting shifted(Setting setting, const Vec3& by);
 
 // The following describe the same surfaces by other triangles, windings and normals. Materials stay,
-// texture coordinates are lost.
+// texture coordinates are lost. `share`: of the triangles, drawn at random, that are treated.
 
 /// Of scenes of quads alone, as make_room() and the built-in ones make them: the other diagonal.
 Scene with_other_diagonals(const Scene& scene);
 /// Every triangle cut into four at the middles of its edges.
 Scene split_in_four(const Scene& scene);
-/// Every other triangle cut in two somewhere along its first edge, whatever its neighbours do.
-Scene with_t_junctions(const Scene& scene, std::uint64_t seed);
-/// Every triangle there twice; the second one turned over, or not.
-Scene duplicated(const Scene& scene, bool turned_over);
-/// On every triangle lies a smaller one in its plane.
-Scene with_coplanar_faces(const Scene& scene);
-
-/// All triangles wound the other way.
-Scene flipped(const Scene& scene);
-/// Half of the triangles wound the other way.
-Scene flipped_at_random(const Scene& scene, std::uint64_t seed);
-/// The triangles' own normals at their corners, times `sign`; only every `step`-th triangle has any.
-Scene with_flat_normals(const Scene& scene, float sign, std::size_t step = 1);
+/// Cut in two somewhere along the first edge, whatever the neighbours do.
+Scene with_t_junctions(const Scene& scene, float share);
+/// There twice, the second time turned over.
+Scene duplicated(const Scene& scene, float share);
+/// A smaller triangle lies on them, in their plane.
+Scene with_coplanar_faces(const Scene& scene, float share);
+/// Wound the other way.
+Scene flipped(const Scene& scene, float share);
+/// The triangles' own normals at their corners times `sign`; the other triangles have none.
+Scene with_flat_normals(const Scene& scene, float sign, float share);
 
 } // namespace afterglow
