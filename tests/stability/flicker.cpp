@@ -24,8 +24,8 @@ struct Pixels {
           reflectance(3, static_cast<Index>(camera.width) * camera.height) {
         for (int y = 0; y < camera.height; ++y)
             for (int x = 0; x < camera.width; ++x) {
-                const Vec3 direction = camera.direction(static_cast<float>(x) + 0.5f,
-                                                        static_cast<float>(y) + 0.5f);
+                const Vec3 direction =
+                    camera.direction(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
                 const Hit hit = surface.closest_hit({camera.position, direction});
                 if (!hit) throw Error("the camera sees past the scene");
                 reflectance.col(static_cast<Index>(at.size())) = surface.reflectance(hit);
@@ -86,8 +86,7 @@ Flicker measure_flicker(const Surface& surface, const TransferOperator& transfer
         PathTracerOptions tracer; // its `plain` paths do not depend on the lights
         tracer.samples = options.samples_per_run;
         tracer.seed = options.seed + static_cast<std::uint64_t>(run);
-        const IrradianceEstimate estimate =
-            estimate_irradiance(surface, frames, pixels.at, tracer);
+        const IrradianceEstimate estimate = estimate_irradiance(surface, frames, pixels.at, tracer);
         Eigen::ArrayXXd means(pixels.blocks(), frame_count);
         for (Index f = 0; f < frame_count; ++f)
             means.col(f) = pixels.block_means(

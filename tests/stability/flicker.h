@@ -27,9 +27,9 @@ struct FlickerOptions {
     std::uint64_t seed = 1;
 };
 
-/// All that the camera sees are surfaces; its picture is a multiple of 16 wide and high. frames: one
-/// light each. The reference sends the same paths in all frames, so that most of its noise cancels
-/// in a change.
+/// All that the camera sees are surfaces; its picture is a multiple of 16 wide and high. frames:
+/// one light each. The reference sends the same paths in all frames, so that most of its noise
+/// cancels in a change.
 Flicker measure_flicker(const Surface& surface, const TransferOperator& transfer,
                         std::span<const Spotlight> frames, const Camera& camera,
                         const FlickerOptions& options = {});

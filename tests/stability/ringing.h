@@ -10,7 +10,7 @@ namespace afterglow {
 /// shadow, or of noise.
 struct Ringing {
     double negative_share = 0.0; // of the places where a colour is negative
-    double largest = 0.0;        // size of the most negative, relative to the mean of what is positive
+    double largest = 0.0; // size of the most negative, relative to the mean of what is positive
 };
 
 /// n . sum_j B_j V_j at the places, 3 x places [W/m^2]: what Display clamps. Zero where no function

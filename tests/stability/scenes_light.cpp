@@ -52,14 +52,10 @@ Scene make_room(const RoomShape& shape) {
     add_quad(scene, parallelogram({-o, 0, -o}, across, along), 0);
     if (shape.open[4] < 1.0f)
         add_quad(scene, parallelogram({-o, height, -o}, along * (1.0f - shape.open[4]), across), 0);
-    if (shape.open[0] < 1.0f)
-        add_quad(scene, parallelogram({0, -o, -o}, up(0), across), 1);
-    if (shape.open[1] < 1.0f)
-        add_quad(scene, parallelogram({length, -o, -o}, across, up(1)), 0);
-    if (shape.open[2] < 1.0f)
-        add_quad(scene, parallelogram({-o, -o, 0}, along, up(2)), 0);
-    if (shape.open[3] < 1.0f)
-        add_quad(scene, parallelogram({-o, -o, width}, up(3), along), 2);
+    if (shape.open[0] < 1.0f) add_quad(scene, parallelogram({0, -o, -o}, up(0), across), 1);
+    if (shape.open[1] < 1.0f) add_quad(scene, parallelogram({length, -o, -o}, across, up(1)), 0);
+    if (shape.open[2] < 1.0f) add_quad(scene, parallelogram({-o, -o, 0}, along, up(2)), 0);
+    if (shape.open[3] < 1.0f) add_quad(scene, parallelogram({-o, -o, width}, up(3), along), 2);
 
     const float s = shape.sunken;
     const bool sinks = s > 0.0f;

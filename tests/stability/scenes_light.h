@@ -7,14 +7,16 @@
 
 namespace afterglow {
 
-/// A room of 5 x 2.8 x 4 m, x, y and z from 0, y up: white, the wall x = 0 red, the wall z = 4 blue;
-/// on its floor a turned cabinet and a table with one leg. All surfaces are quads of two consecutive
-/// triangles, (a, b, c) and (a, c, d), whose fronts face the air.
+/// A room of 5 x 2.8 x 4 m, x, y and z from 0, y up: white, the wall x = 0 red, the wall z = 4
+/// blue; on its floor a turned cabinet and a table with one leg. All surfaces are quads of two
+/// consecutive triangles, (a, b, c) and (a, c, d), whose fronts face the air.
 struct RoomShape {
-    float overhang = 0.0f; // that all walls go on beyond the room's edges [m]: they cross each other
-    float sunken = 0.0f;   // how far furniture reaches below the floor [m], and the leg into the table
-    /// Height of an opening from the top of each of the walls x = 0, x = 5, z = 0, z = 4, and of the
-    /// ceiling from its x = 5 side, as a share of the wall; 1: the wall is missing.
+    float overhang =
+        0.0f; // that all walls go on beyond the room's edges [m]: they cross each other
+    float sunken =
+        0.0f; // how far furniture reaches below the floor [m], and the leg into the table
+    /// Height of an opening from the top of each of the walls x = 0, x = 5, z = 0, z = 4, and of
+    /// the ceiling from its x = 5 side, as a share of the wall; 1: the wall is missing.
     std::array<float, 5> open = {0, 0, 0, 0, 0};
 };
 

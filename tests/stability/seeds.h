@@ -25,8 +25,8 @@ struct Difference {
 };
 
 /// `other` are the results of the first seeds of `base` in another setting, and compared with
-/// those; all of `base`, at least two, tell the spread. The yardstick is the spread of `base` alone:
-/// a result that has become noisy does not excuse itself.
+/// those; all of `base`, at least two, tell the spread. The yardstick is the spread of `base`
+/// alone: a result that has become noisy does not excuse itself.
 Difference difference(const OfSeeds& base, const OfSeeds& other);
 
 } // namespace afterglow

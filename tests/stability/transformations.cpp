@@ -25,7 +25,9 @@ public:
         scene_.triangles.push_back({first, first + 1, first + 2});
         scene_.material_index.push_back(from_.material_index[t]);
     }
-    const Vec3& corner(std::size_t t, int c) const { return from_.positions[from_.triangles[t][c]]; }
+    const Vec3& corner(std::size_t t, int c) const {
+        return from_.positions[from_.triangles[t][c]];
+    }
     Scene finish() {
         scene_.summary.faces = scene_.summary.triangles = scene_.triangles.size();
         return std::move(scene_);

@@ -21,8 +21,8 @@ Setting scaled(Setting setting, float factor);
 /// All coordinates plus `by`, rounded to float.
 Setting shifted(Setting setting, const Vec3& by);
 
-// The following describe the same surfaces by other triangles, windings and normals. Materials stay,
-// texture coordinates are lost. `share`: of the triangles, drawn at random, that are treated.
+// The following describe the same surfaces by other triangles, windings and normals. Materials
+// stay, texture coordinates are lost. `share`: of the triangles, drawn at random, that are treated.
 
 /// Of scenes of quads alone, as make_room() and the built-in ones make them: the other diagonal.
 Scene with_other_diagonals(const Scene& scene);
