@@ -135,18 +135,23 @@ Figures measure_stairs(double rise) {
 
 // Closed spaces. ---------------------------------------------------------------------------------
 
-/// What leaks into the closed part of a scene, or out of it, relative to the mean where the light
-/// is.
+/// What leaks into the closed part of a scene, or out of it, relative to the reference's mean where
+/// the light is; and the error there.
 Figures measure_leak(LitScene lit, const Vec3& outside, const Vec3& inside, LightAt light) {
     const Precomputed room(std::move(lit.scene));
-    const bool is_dark_inside = light == LightAt::outside;
-    const Eigen::Array3Xf dark = room.indirect(
-        lit.light, points_in_sight(room.surface(), is_dark_inside ? inside : outside, 20000, 2));
-    const Eigen::Array3Xf bright = room.indirect(
-        lit.light, points_in_sight(room.surface(), is_dark_inside ? outside : inside, 2000, 1));
-    return {{"points", static_cast<double>(room.transfer().points.size())},
-            percent("largest in the dark / lit mean", largest(dark) / bright.mean()),
-            percent("mean in the dark / lit mean", dark.mean() / bright.mean())};
+    const auto seen_from = [&](LightAt place, int count) {
+        return points_in_sight(room.surface(), place == LightAt::inside ? inside : outside, count,
+                               2);
+    };
+    const LightAt dark_place = light == LightAt::inside ? LightAt::outside : LightAt::inside;
+    const Eigen::Array3Xf dark = room.indirect(lit.light, seen_from(dark_place, 20000));
+    const Comparison bright = compare(room, lit.light, seen_from(light, rays));
+    Figures figures{
+        {"points", static_cast<double>(room.transfer().points.size())},
+        percent("largest in the dark / lit mean", largest(dark) / bright.reference_mean()),
+        percent("mean in the dark / lit mean", dark.mean() / bright.reference_mean())};
+    append(figures, "lit", bright);
+    return figures;
 }
 
 Figures measure_closed_corner(double wall, LightAt light) {

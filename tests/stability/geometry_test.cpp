@@ -1,0 +1,58 @@
+#include "core/builtin_scenes.h"
+#include "tests/stability/comparison.h"
+#include "tests/stability/scenes.h"
+#include "tests/support/surface_samples.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+// What is promised of hard shapes at default settings.
+
+namespace afterglow {
+namespace {
+
+TEST(TwoRoomsWithADoor, AreWithinThreePercentAndTheDarkOneWithinFiveOfItsOwnMean) {
+    LitScene lit = two_rooms(0.05f, 0.9f);
+    const Precomputed rooms(std::move(lit.scene));
+    const Comparison seen =
+        compare(rooms, lit.light, points_in_sight(rooms.surface(), {2.0f, 1.4f, 2.0f}, 400, 1));
+    EXPECT_LE(seen.rel_rmse(), 0.03);
+    const Comparison dark = compare(
+        rooms, lit.light, points_in_sight(rooms.surface(), {6.05f, 1.4f, 2.0f}, 400, 2), 0.03);
+    EXPECT_LE(dark.rel_rmse(), 0.05);
+}
+
+class Furnace : public testing::TestWithParam<std::pair<double, double>> {};
+
+/// A closed box whose indirect light is, in the mean over its six faces of 4 m^2, rho / (1 - rho)
+/// times the direct light.
+TEST_P(Furnace, MeanIsWithinThePromiseOfTheClosedForm) {
+    const auto [rho, promised] = GetParam();
+    const Precomputed box(make_builtin_scene("builtin:furnace:" + std::to_string(rho)));
+    const Spotlight light{
+        .position = Vec3(-0.3f, 0.4f, 0.1f), .inner_angle = 180.0f, .outer_angle = 180.0f};
+    const double exact = rho / (1.0 - rho) * 4.0 * EIGEN_PI / 24.0;
+    const double mean =
+        box.indirect(light, points_by_area(box.scene(), 20000, 3)).cast<double>().mean();
+    EXPECT_NEAR(mean / exact, 1.0, promised);
+}
+
+std::string furnace_name(const testing::TestParamInfo<Furnace::ParamType>& furnace) {
+    return std::to_string(std::lround(100.0 * furnace.param.first));
+}
+
+INSTANTIATE_TEST_SUITE_P(Reflectances, Furnace,
+                         testing::Values(std::pair(0.95, 0.01), std::pair(0.99, 0.03)),
+                         furnace_name);
+
+TEST(BlackFurnace, HasNoIndirectLight) {
+    const Precomputed box(make_builtin_scene("builtin:furnace:0"));
+    const Spotlight light{.inner_angle = 180.0f, .outer_angle = 180.0f};
+    EXPECT_EQ(box.indirect(light, points_by_area(box.scene(), 1000, 3)).maxCoeff(), 0.0f);
+}
+
+} // namespace
+} // namespace afterglow
