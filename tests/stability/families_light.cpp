@@ -63,7 +63,7 @@ Spotlight spot(const Vec3& position, const Vec3& direction, float inner, float o
     return light;
 }
 
-// Ringing. Where much light bounces about, it lifts what rings above zero; so the rooms are dark.
+// Ringing. Where much light bounces about, it lifts what rings above zero: dark rooms show it.
 
 constexpr float dark = 0.1f; // reflectance
 

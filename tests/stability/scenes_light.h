@@ -11,10 +11,10 @@ namespace afterglow {
 /// blue; on its floor a turned cabinet and a table with one leg. All surfaces are quads of two
 /// consecutive triangles, (a, b, c) and (a, c, d), whose fronts face the air.
 struct RoomShape {
-    float overhang =
-        0.0f; // that all walls go on beyond the room's edges [m]: they cross each other
-    float sunken =
-        0.0f; // how far furniture reaches below the floor [m], and the leg into the table
+    /// How far all walls go on beyond the room's edges [m]; they cross each other.
+    float overhang = 0.0f;
+    /// How far furniture reaches below the floor [m]; the table's leg then goes into its top.
+    float sunken = 0.0f;
     /// Height of an opening from the top of each of the walls x = 0, x = 5, z = 0, z = 4, and of
     /// the ceiling from its x = 5 side, as a share of the wall; 1: the wall is missing.
     std::array<float, 5> open = {0, 0, 0, 0, 0};
