@@ -87,7 +87,13 @@ std::vector<Figure> missing_walls(double count) {
     return error_figures(make_room(shape));
 }
 
-/// Mean and spread of the relative error over seeds, without the reference's variance.
+/// Standard deviation over seeds.
+double deviation(const Eigen::ArrayXd& of_seed) {
+    return std::sqrt((of_seed - of_seed.mean()).square().sum()
+                     / (static_cast<double>(of_seed.size()) - 1.0));
+}
+
+/// Mean and spread over seeds of the error, without the reference's variance in relRMSE.
 std::vector<Figure> spread(const Scene& scene, const Vec3& eye, const Spotlight& light, int count) {
     Setting setting{scene, light, {}};
     const Surface surface(setting.scene);
@@ -98,19 +104,24 @@ std::vector<Figure> spread(const Scene& scene, const Vec3& eye, const Spotlight&
     tracer.strategy = PathStrategy::connected;
     const IrradianceEstimate reference =
         estimate_irradiance(surface, {&light, 1}, setting.places, tracer);
-    Eigen::ArrayXd error(count);
+    const double reference_error = reference.relative_error.front();
     const OfSeeds results = indirect_of_seeds(setting, 1, count);
+    Eigen::ArrayXd rel_rmse(count), rel_l1(count), bias(count);
     for (int k = 0; k < count; ++k) {
         const Measures m = measure(results[static_cast<std::size_t>(k)], reference.indirect);
-        error[k] = std::sqrt(
-            std::max(0.0, std::pow(m.rel_rmse, 2) - std::pow(reference.relative_error.front(), 2)));
+        rel_rmse[k] =
+            std::sqrt(std::max(0.0, std::pow(m.rel_rmse, 2) - std::pow(reference_error, 2)));
+        rel_l1[k] = m.rel_l1;
+        bias[k] = m.bias;
     }
-    const double deviation =
-        std::sqrt((error - error.mean()).square().sum() / (static_cast<double>(count) - 1.0));
-    return {percent("relRMSE", error.mean()),
-            percent("its deviation over it", deviation / error.mean()),
-            percent("largest relRMSE", error.maxCoeff()),
-            percent("reference error", reference.relative_error.front())};
+    return {percent("relRMSE", rel_rmse.mean()),
+            percent("its deviation over it", deviation(rel_rmse) / rel_rmse.mean()),
+            percent("largest relRMSE", rel_rmse.maxCoeff()),
+            percent("relL1", rel_l1.mean()),
+            percent("its deviation over it", deviation(rel_l1) / rel_l1.mean()),
+            percent("bias", bias.mean()),
+            percent("its deviation", deviation(bias)),
+            percent("reference error", reference_error)};
 }
 
 } // namespace
