@@ -11,7 +11,7 @@ namespace afterglow {
 namespace {
 
 Setting room() {
-    Setting setting{make_room(), room_light(), {}};
+    Setting setting{make_room(), room_lights(), {}};
     const Surface surface(setting.scene);
     setting.places = points_in_sight(surface, Vec3(2.5f, 1.5f, 2.0f), 400, 5);
     return setting;
@@ -33,8 +33,8 @@ TEST(Invariance, PowersOfTwoOfTheUnitOfLengthGiveTheSameBits) {
 }
 
 // Two results differ by less than twice the standard error that their seeds alone would make.
-// Versions are combined, as each takes an operator of its own; afterglow_stability looks at them one
-// by one, and at a scene that is wound the other way as a whole, of which this does not hold.
+// Versions are combined, as each takes an operator of its own; afterglow_stability looks at them
+// one by one, and at a scene that is wound the other way as a whole, of which this does not hold.
 TEST(Invariance, TheSameSurfacesOtherwiseDescribedGiveTheSameLight) {
     constexpr double most_errors = 2.0;
     const Scene scene = make_room();

@@ -75,13 +75,26 @@ void add_board(Scene& room, const Vec3& middle, float side) {
     add_box(room, middle - half, middle + half, 0.0f, true, true, 0);
 }
 
-Spotlight room_light() {
-    Spotlight light{.position = Vec3(2.3f, 2.6f, 1.9f),
-                    .direction = Vec3(0.1f, -1.0f, -0.1f),
-                    .inner_angle = 40.0f,
-                    .outer_angle = 50.0f};
-    light.check();
-    return light;
+std::vector<Spotlight> room_lights() {
+    const std::array<std::array<Vec3, 2>, 8> places = {{
+        {Vec3(2.3f, 2.6f, 1.9f), Vec3(0.1f, -1.0f, -0.1f)},
+        {Vec3(0.8f, 2.2f, 0.8f), Vec3(0.6f, -1.0f, 0.5f)},
+        {Vec3(4.2f, 2.4f, 3.2f), Vec3(-0.4f, -1.0f, -0.2f)},
+        {Vec3(4.4f, 1.6f, 0.7f), Vec3(-0.5f, 0.2f, 1.0f)},
+        {Vec3(1.5f, 1.8f, 1.5f), Vec3(1.0f, 0.1f, -0.3f)},
+        {Vec3(2.8f, 2.0f, 3.4f), Vec3(-1.0f, -0.4f, -0.1f)},
+        {Vec3(3.4f, 1.5f, 2.6f), Vec3(0.2f, 1.0f, 0.1f)},
+        {Vec3(2.0f, 1.7f, 2.4f), Vec3(-0.2f, -0.3f, -1.0f)},
+    }};
+    std::vector<Spotlight> lights;
+    for (const auto& [position, direction] : places) {
+        lights.push_back({.position = position,
+                          .direction = direction,
+                          .inner_angle = 40.0f,
+                          .outer_angle = 50.0f});
+        lights.back().check();
+    }
+    return lights;
 }
 
 } // namespace afterglow

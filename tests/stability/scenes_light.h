@@ -4,6 +4,7 @@
 #include "transport/spotlight.h"
 
 #include <array>
+#include <vector>
 
 namespace afterglow {
 
@@ -25,7 +26,9 @@ Scene make_room(const RoomShape& shape = {});
 /// A level square board of the given side, 1 cm thick, white, about `middle`.
 void add_board(Scene& room, const Vec3& middle, float side);
 
-/// Hangs in the room below its ceiling and shines down, on the table as well as on the floor.
-Spotlight room_light();
+/// Hang in the room and shine down, to the walls and onto the furniture, each about as bright. The
+/// first hangs in the middle below the ceiling. What an operator does to one of them by chance, it
+/// hardly does to another.
+std::vector<Spotlight> room_lights();
 
 } // namespace afterglow

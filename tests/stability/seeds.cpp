@@ -26,13 +26,18 @@ OfSeeds indirect_of_seeds(const Setting& setting, std::uint64_t first, int count
     for (int k = 0; k < count; ++k) {
         options.seed = first + static_cast<std::uint64_t>(k);
         const TransferOperator transfer = precompute(surface, options);
-        const VectorIrradiance field = LightTransport(transfer).indirect(surface, setting.light);
+        const LightTransport transport(transfer);
         const Display display(transfer, surface);
-        Eigen::Array3Xf e(3, static_cast<Index>(setting.places.size()));
-        parallel_for(e.cols(), [&](Index p) {
-            bool covered = false;
-            e.col(p) = display.irradiance(setting.places[p], field, covered);
-        });
+        const auto places = static_cast<Index>(setting.places.size());
+        const auto lights = static_cast<Index>(setting.lights.size());
+        Eigen::Array3Xf e(3, lights * places);
+        for (Index l = 0; l < lights; ++l) {
+            const VectorIrradiance field = transport.indirect(surface, setting.lights[l]);
+            parallel_for(places, [&](Index p) {
+                bool covered = false;
+                e.col(l * places + p) = display.irradiance(setting.places[p], field, covered);
+            });
+        }
         results.push_back(std::move(e));
     }
     return results;
@@ -41,7 +46,7 @@ OfSeeds indirect_of_seeds(const Setting& setting, std::uint64_t first, int count
 Difference difference(const OfSeeds& base, const OfSeeds& other) {
     assert(base.size() >= 2 && !other.empty() && other.size() <= base.size());
     const Eigen::Array3Xd mean = mean_over(base);
-    double variance = 0.0; // of one seed's result, mean over places and colours
+    double variance = 0.0; // of one seed's result, mean over lights, places and colours
     for (const Eigen::Array3Xf& e : base)
         variance += (e.cast<double>() - mean).square().mean();
     variance /= static_cast<double>(base.size()) - 1.0;

@@ -8,7 +8,8 @@
 
 namespace afterglow {
 
-/// Indirect irradiance [W/m^2] at the places of a setting, 3 x places, by one operator a seed.
+/// Indirect irradiance [W/m^2] at the P places of a setting, column l * P + p for light l and place
+/// p, by one operator a seed.
 using OfSeeds = std::vector<Eigen::Array3Xf>;
 
 /// Precomputes for the seeds first, first + 1, ...
@@ -16,11 +17,11 @@ OfSeeds indirect_of_seeds(const Setting& setting, std::uint64_t first, int count
                           PrecomputeOptions options = {});
 
 /// How far the results of two settings that describe the same are from each other, relative to the
-/// mean irradiance. Root mean squares over places and colours.
+/// mean irradiance. Root mean squares over lights, places and colours.
 struct Difference {
     double size = 0.0;           // of the difference of the means over the seeds
     double standard_error = 0.0; // of such a difference, were the two of independent seeds
-    double bias = 0.0;           // mean of the difference over the places
+    double bias = 0.0;           // mean of the difference
     double in_errors() const { return size / standard_error; }
 };
 

@@ -50,8 +50,10 @@ Setting scaled(Setting setting, float factor) {
     for (Vec3& p : setting.scene.positions)
         p *= factor;
     if (setting.scene.viewpoint) *setting.scene.viewpoint *= factor;
-    setting.light.position *= factor;
-    setting.light.intensity *= factor * factor;
+    for (Spotlight& light : setting.lights) {
+        light.position *= factor;
+        light.intensity *= factor * factor;
+    }
     for (SurfacePoint& x : setting.places)
         x.position *= factor;
     return setting;
@@ -61,7 +63,8 @@ Setting shifted(Setting setting, const Vec3& by) {
     for (Vec3& p : setting.scene.positions)
         p += by;
     if (setting.scene.viewpoint) *setting.scene.viewpoint += by;
-    setting.light.position += by;
+    for (Spotlight& light : setting.lights)
+        light.position += by;
     for (SurfacePoint& x : setting.places)
         x.position += by;
     return setting;

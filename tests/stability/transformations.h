@@ -7,16 +7,17 @@
 
 namespace afterglow {
 
-/// What one asks of the engine: the light that a lamp makes in a scene, at some places.
+/// What one asks of the engine: the light that lamps make in a scene, each by itself, at some
+/// places.
 struct Setting {
     Scene scene;
-    Spotlight light;
+    std::vector<Spotlight> lights;
     std::vector<SurfacePoint> places;
 };
 
 // The following leave irradiance as it is, at the places that move along.
 
-/// All coordinates times `factor`; the light's intensity times its square.
+/// All coordinates times `factor`; the lights' intensities times its square.
 Setting scaled(Setting setting, float factor);
 /// All coordinates plus `by`, rounded to float.
 Setting shifted(Setting setting, const Vec3& by);
