@@ -35,6 +35,10 @@ double Comparison::rel_rmse(double mean) const {
     return std::sqrt(std::max(0.0, square)) / mean;
 }
 
+double Comparison::bias_error() const {
+    return reference_error() / std::sqrt(static_cast<double>(reference.cols()));
+}
+
 double Comparison::reference_error() const {
     return std::sqrt(standard_error.cast<double>().square().mean()) / reference_mean();
 }

@@ -43,6 +43,8 @@ struct Comparison {
     double rel_rmse() const { return rel_rmse(reference_mean()); }
     /// Mean error relative to the reference's mean.
     double bias() const { return indirect.cast<double>().mean() / reference_mean() - 1.0; }
+    /// Its standard error by the reference's noise.
+    double bias_error() const;
     /// Root mean square of the standard errors relative to the reference's mean.
     double reference_error() const;
 };

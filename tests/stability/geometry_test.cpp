@@ -8,6 +8,7 @@
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 // What is promised of hard shapes at default settings.
 
@@ -20,8 +21,10 @@ TEST(TwoRoomsWithADoor, AreWithinThreePercentAndTheDarkOneWithinFiveOfItsOwnMean
     const Comparison seen =
         compare(rooms, lit.light, points_in_sight(rooms.surface(), {2.0f, 1.4f, 2.0f}, 400, 1));
     EXPECT_LE(seen.rel_rmse(), 0.03);
-    const Comparison dark = compare(
-        rooms, lit.light, points_in_sight(rooms.surface(), {6.05f, 1.4f, 2.0f}, 400, 2), 0.03);
+    std::vector<SurfacePoint> places =
+        points_in_sight(rooms.surface(), {6.05f, 1.4f, 2.0f}, 400, 2);
+    std::erase_if(places, [](const SurfacePoint& x) { return x.position.x() < 4.0499f; });
+    const Comparison dark = compare(rooms, lit.light, places, 0.03);
     EXPECT_LE(dark.rel_rmse(), 0.05);
 }
 
