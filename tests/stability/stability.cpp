@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 // The scenes where the method fails, and by how much: error against a dial, family by family. By
 // hand: afterglow_stability [FAMILY ...] [--csv FOLDER]; without a family, all of them.
@@ -48,7 +49,10 @@ std::vector<Family> choose(std::vector<Family> families, const std::vector<std::
 }
 
 void run(const Arguments& arguments) {
-    const std::vector<Family> families = choose(geometry_families(), arguments.names);
+    std::vector<Family> all = geometry_families();
+    for (const std::vector<Family>& more : {light_families(), input_families()})
+        all.insert(all.end(), more.begin(), more.end());
+    const std::vector<Family> families = choose(std::move(all), arguments.names);
     if (!arguments.folder.empty()) std::filesystem::create_directories(arguments.folder);
     for (const Family& family : families)
         report(family, arguments.folder);
