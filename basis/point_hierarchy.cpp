@@ -17,9 +17,9 @@ namespace {
 /// Supports of a level whose density varies: a function reaches 1.5 times as far as its fourth
 /// neighbour that faces about the same way, so that everywhere about as many overlap. Distances grow
 /// with the difference in openness as weights fall with it: along a contact a function reaches its
-/// like.
+/// like. `longest`: senders' supports are kept short, as direct light has shadow edges.
 std::vector<float> adaptive_supports(const std::vector<Candidate>& points,
-                                     std::span<const Openness> openness, float spacing) {
+                                     std::span<const Openness> openness, float longest) {
     constexpr int neighbour = 4, considered = 48;
     Eigen::Matrix3Xf positions(3, points.size());
     for (std::size_t i = 0; i < points.size(); ++i) positions.col(i) = points[i].at.position;
@@ -38,9 +38,8 @@ std::vector<float> adaptive_supports(const std::vector<Candidate>& points,
                                / openness_likeness(openness_difference2(openness[j], openness[i])));
         }
         std::sort(distance.begin(), distance.end());
-        const float farthest = 1.5f * spacing;
-        const float reach = distance.size() >= neighbour ? distance[neighbour - 1] : farthest;
-        support[i] = 1.5f * std::min(reach, farthest);
+        support[i] = distance.size() >= neighbour ? std::min(1.5f * distance[neighbour - 1], longest)
+                                                  : longest;
     });
     return support;
 }
@@ -85,7 +84,8 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
         }
         if (by_openness) {
             hierarchy.openness_level = std::min(hierarchy.openness_level, l);
-            supports[l] = adaptive_supports(levels[l], placed, spacing);
+            const float longest = (display ? 2.25f : 1.28f) * spacing;
+            supports[l] = adaptive_supports(levels[l], placed, longest);
         } else {
             const float t = level_count > 1 ? static_cast<float>(l) / (level_count - 1) : 0.0f;
             const float reach = std::lerp(options.shape.reach_coarsest, options.shape.reach_finest, t);

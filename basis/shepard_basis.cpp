@@ -1,5 +1,7 @@
 #include "basis/shepard_basis.h"
 
+#include "core/parallel.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -7,26 +9,45 @@ namespace afterglow {
 namespace {
 
 constexpr float behind_a_wall = 1e-4f;
-constexpr float negligible = 1e-3f; // beside what is in sight
+constexpr float negligible = 1e-3f;  // beside what is in sight
+/// Of a function's support: so far over the surface walls are looked for, so that mouldings and
+/// roughness are none, unless something else is closer above it.
+constexpr float lift_share = 0.02f;
 
 } // namespace
 
 ShepardBasis::ShepardBasis(const PointHierarchy& points, const Surface& surface, bool see_walls)
-    : points_(points), surface_(surface), see_walls_(see_walls) {
+    : points_(points), surface_(surface), see_walls_(see_walls), lift_(points.size()) {
+    parallel_for(points.size(), [&](Index j) {
+        lift_[j] = std::max(free_lift(points.point(j), lift_share * points.support[j]),
+                            surface.lift());
+    }, 256);
     for (int l = 0; l < points.levels(); ++l) {
         const Index begin = points.begin(l), count = points.end(l) - points.begin(l);
         tree_.emplace_back(points.position.middleCols(begin, count), points.support.segment(begin, count),
                            points.begin(l));
+        highest_lift_.push_back(
+            count == 0 ? 0.0f : lift_share * points.support.segment(begin, count).maxCoeff());
         if (l >= points.openness_level) probe_.emplace_back(surface, points.spacing[l]);
         nearest_.push_back(std::make_unique<NearestPoints>(points.position.middleCols(begin, count)));
     }
 }
 
-bool ShepardBasis::wall_between(const SurfacePoint& x, std::uint32_t j) const {
-    // Lifted a little, so that mouldings and roughness are no wall.
-    const float lift = std::max(0.02f * points_.support[j], surface_.lift());
+float ShepardBasis::free_lift(const SurfacePoint& x, float wanted) const {
+    const Hit above = surface_.closest_hit({surface_.lifted(x), x.normal, wanted});
+    return above ? 0.5f * above.distance : wanted;
+}
+
+bool ShepardBasis::wall_between(const SurfacePoint& x, float lift_of_x, std::uint32_t j) const {
+    const float lift = std::max(std::min(lift_of_x, lift_share * points_.support[j]), surface_.lift());
     return surface_.blocked(x.position + lift * x.normal,
-                            points_.position.col(j) + lift * points_.normal.col(j));
+                            points_.position.col(j) + lift_[j] * points_.normal.col(j));
+}
+
+bool ShepardBasis::enclosed(int level, const SurfacePoint& x) const {
+    if (level < points_.openness_level) return false;
+    const Openness here = probe_[static_cast<std::size_t>(level - points_.openness_level)](x);
+    return 1.0f + x.normal.dot(here.tail<3>()) < 0.1f;
 }
 
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
@@ -44,7 +65,7 @@ void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisE
     if (row.size() - first > 1) {
         const auto candidates = std::span(row).subspan(first);
         if (level >= points_.openness_level) favour_equal_openness(level, x, candidates);
-        if (see_walls_) row.resize(first + hide_behind_walls(x, candidates));
+        if (see_walls_) row.resize(first + hide_behind_walls(level, x, candidates));
     }
     const auto found = std::span(row).subspan(first);
     std::sort(found.begin(), found.end(),
@@ -70,8 +91,9 @@ void ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
             + openness_likeness(openness_difference2(points_.openness_of(entry.index), here));
 }
 
-std::size_t ShepardBasis::hide_behind_walls(const SurfacePoint& x,
+std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
                                             std::span<BasisEntry> row) const {
+    const float lift = free_lift(x, highest_lift_[level]);
     std::sort(row.begin(), row.end(), [](const BasisEntry& a, const BasisEntry& b) {
         return a.value != b.value ? a.value > b.value : a.index < b.index;
     });
@@ -79,7 +101,7 @@ std::size_t ShepardBasis::hide_behind_walls(const SurfacePoint& x,
     for (BasisEntry& entry : row) {
         if (entry.value < negligible * in_sight) {
             entry.value = 0.0f;
-        } else if (wall_between(x, entry.index)) {
+        } else if (wall_between(x, lift, entry.index)) {
             hidden += entry.value;
             entry.value *= -behind_a_wall; // its sign marks it
         } else {
@@ -87,6 +109,7 @@ std::size_t ShepardBasis::hide_behind_walls(const SurfacePoint& x,
         }
     }
     const bool enough = in_sight > 0.01f * hidden;
+    if (in_sight == 0.0f && enclosed(level, x)) return 0;
     std::size_t kept = 0;
     for (const BasisEntry& entry : row)
         if (entry.value > 0.0f || (entry.value < 0.0f && !enough))
@@ -101,11 +124,12 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
     if (row.size() > first) return;
     std::vector<std::uint32_t> near;
     const float farthest = 4.0f * points_.spacing[level];
+    const float lift = free_lift(x, highest_lift_[level]);
     nearest_[level]->closest(x.position, 32, near);
     for (const std::uint32_t k : near) {
         const std::uint32_t j = points_.begin(level) + k;
         if ((x.position - points_.position.col(j)).norm() > farthest) break; // closest first
-        if (x.normal.dot(points_.normal.col(j)) <= 0.1f || wall_between(x, j)) continue;
+        if (x.normal.dot(points_.normal.col(j)) <= 0.1f || wall_between(x, lift, j)) continue;
         row.push_back({j, 1.0f});
         return;
     }

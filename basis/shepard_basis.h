@@ -26,7 +26,8 @@ using BasisEntry = SparseEntry<float>; // a function and B_j(x)
 ///
 /// v_j: 1, or 0 where something stands between x and the function's centre, so that light does not
 /// leak through walls however thin. Where functions in sight have less than a hundredth of the
-/// weight of those behind walls, 10^-4 instead of 0, so that a level never loses a point it reaches.
+/// weight of those behind walls, 10^-4 instead of 0, so that a level never loses a point it reaches;
+/// but a point that is enclosed, as under a carpet, and sees no function is not covered.
 /// Weights below a thousandth of those in sight are left out.
 /// One R-tree a level. Immutable; queries may run concurrently.
 class ShepardBasis {
@@ -38,6 +39,9 @@ public:
     /// Appends the functions of one level with B_j(x) > 0, by increasing id; they sum to 1, or there
     /// are none where the level does not cover x.
     void evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
+    /// Whether x sees hardly anything that is farther than a few spacings, n . F < 0.1 for the longest
+    /// distance of the openness feature; false on levels without.
+    bool enclosed(int level, const SurfacePoint& x) const;
     /// As evaluate; where the level does not cover x, the closest function within four times its
     /// spacing that faces the same side and is not behind a wall gets all the weight. Still empty where there is none.
     void evaluate_or_nearest(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
@@ -46,6 +50,8 @@ private:
     const PointHierarchy& points_;
     const Surface& surface_;
     bool see_walls_;
+    std::vector<float> lift_;         // of each function's centre [world]
+    std::vector<float> highest_lift_; // of a level's functions
     std::vector<RTree> tree_;
     std::vector<std::unique_ptr<NearestPoints>> nearest_;
     std::vector<OpennessProbe> probe_; // a level each, from PointHierarchy::openness_level on
@@ -53,8 +59,11 @@ private:
     /// Weights, not yet scaled to sum to one, times the openness term.
     void favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
     /// Weights times v_j. Sorts the row, largest first, and leaves what is kept at its begin.
-    std::size_t hide_behind_walls(const SurfacePoint& x, std::span<BasisEntry> row) const;
-    bool wall_between(const SurfacePoint& x, std::uint32_t j) const;
+    std::size_t hide_behind_walls(int level, const SurfacePoint& x,
+                                  std::span<BasisEntry> row) const;
+    /// How high over x to look for walls: `wanted`, or half way to what is closer above it.
+    float free_lift(const SurfacePoint& x, float wanted) const;
+    bool wall_between(const SurfacePoint& x, float lift_of_x, std::uint32_t j) const;
 };
 
 /// Scales the shares of a row so that they sum to one; their sum must not be zero, unless there are

@@ -53,10 +53,11 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
             std::upper_bound(first_.begin(), first_.end(), missing[i]) - first_.begin() - 1);
         const Hit center = grid_[level].center(missing[i] - first_[level]);
         const SurfacePoint x = surface_.point(center);
+        basis_.evaluate_or_nearest(level, x, rows[i]);
         // Where the level has no function, the next coarser speaks for it.
-        for (int l = level; l >= 0 && rows[i].empty(); --l)
-            basis_.evaluate(l, x, rows[i]);
-        if (rows[i].empty()) basis_.evaluate_or_nearest(level, x, rows[i]);
+        if (rows[i].empty() && !basis_.enclosed(level, x))
+            for (int l = level - 1; l >= 0 && rows[i].empty(); --l)
+                basis_.evaluate(l, x, rows[i]);
         if (level + 1 == levels())
             favour_equal_reflectance(basis_.points(), surface_.reflectance(center), rows[i]);
         drop_small_shares(rows[i]);
