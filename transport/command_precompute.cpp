@@ -241,7 +241,7 @@ void add_precompute_command(CLI::App& app) {
         ->type_name("x,y,z");
     add_number(*sub, "--coarse-radius", command->coarse_radius,
                "Distance between the coarsest points (default: 1.28 times the typical distance "
-               "between surfaces); halves from level to level");
+               "between surfaces, less where there are few of them); halves from level to level");
     sub->add_option("--receiver-levels", command->options.receiver_levels,
                     "Levels of receivers, each twice as fine as the one before (default 6)");
     sub->add_option("--sender-levels", command->options.sender_levels,

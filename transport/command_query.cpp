@@ -27,7 +27,9 @@ void run(QueryCommand& command) {
     const ThreadLimit limit(command.run.threads);
     const std::vector<SurfacePoint> points = read_points_csv(command.points);
     const TransferScene opened(command.file, command.scene);
-    const VectorIrradiance field = opened.transport.indirect(opened.surface, command.light);
+    NeumannStatistics neumann;
+    const VectorIrradiance field =
+        opened.transport.indirect(opened.surface, command.light, &neumann);
 
     const auto count = static_cast<Index>(points.size());
     Eigen::Array3Xf irradiance(3, count);
@@ -41,7 +43,9 @@ void run(QueryCommand& command) {
     write_irradiance_csv(command.output, irradiance);
 
     const auto uncovered = std::count(is_uncovered.begin(), is_uncovered.end(), 1);
-    if (uncovered > 0 && !command.run.quiet)
+    if (command.run.quiet) return;
+    warn_of_coarse_light(neumann);
+    if (uncovered > 0)
         std::fprintf(stderr, "afterglow: warning: no function covers %lld of %lld points\n",
                      static_cast<long long>(uncovered), static_cast<long long>(count));
 }

@@ -70,6 +70,7 @@ void run(RenderCommand& command) {
                 static_cast<float>(command.exposure));
 
     if (command.run.quiet) return;
+    if (layer != Layer::direct) warn_of_coarse_light(neumann);
     if (picture.uncovered_pixels > 0)
         std::fprintf(stderr,
                      "afterglow: warning: %llu pixels show places that no function covers\n",

@@ -232,7 +232,7 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
 float link_threshold(const LinkOptions& options, const PointHierarchy& points) {
     const double share = std::min(1.0, points.size() / 60'000.0);
     return options.threshold.value_or(
-        static_cast<float>(0.032 * options.target_error * std::sqrt(share)));
+        static_cast<float>(0.045 * options.target_error * share));
 }
 
 GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,

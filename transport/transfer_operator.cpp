@@ -94,7 +94,10 @@ Radiosity LightTransport::all_bounces(const Radiosity& direct, double tolerance,
                                       NeumannStatistics* statistics) const {
     const KrylovResult result = solve_second_kind(
         [&](const std::vector<float>& f) { return bounce(f); }, direct, 3, tolerance);
-    if (statistics) *statistics = {result.products, result.residual};
+    if (statistics) {
+        statistics->products = result.products;
+        statistics->residual = result.residual;
+    }
     return result.solution;
 }
 
@@ -112,13 +115,9 @@ VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
 }
 
 /// S e, where e are the coefficients of direct irradiance.
-VectorIrradiance LightTransport::apply_paper(const Surface& surface, const Spotlight& light) const {
+VectorIrradiance LightTransport::apply_paper(const std::vector<float>& direct_irradiance) const {
     const PointHierarchy& points = transfer_.points;
-    std::vector<float> e(3 * static_cast<std::size_t>(transfer_.senders()));
-    parallel_for(
-        transfer_.senders(),
-        [&](Index m) { Rgb::Map(&e[3 * m]) = direct_irradiance(surface, light, points.point(m)); },
-        256);
+    std::vector<float> e(direct_irradiance);
     transfer_.pull.pull(points, transfer_.sender_levels, 3, e);
     transfer_.pyramid.analyse(points, transfer_.sender_levels, 3, e);
     VectorIrradiance field(9 * static_cast<std::size_t>(points.size()));
@@ -136,18 +135,40 @@ VectorIrradiance LightTransport::apply_paper(const Surface& surface, const Spotl
     return field;
 }
 
+/// Of the finest level; `light`: three numbers a sender.
+std::uint32_t LightTransport::lit_senders(const std::vector<float>& light) const {
+    std::uint32_t count = 0;
+    for (std::size_t m = transfer_.points.begin(transfer_.sender_levels - 1); m < transfer_.senders(); ++m)
+        count += light[3 * m] > 0.0f || light[3 * m + 1] > 0.0f || light[3 * m + 2] > 0.0f;
+    return count;
+}
+
 VectorIrradiance LightTransport::indirect(const Surface& surface, const Spotlight& light,
                                           NeumannStatistics* statistics) const {
+    NeumannStatistics local;
+    NeumannStatistics& s = statistics ? *statistics : local;
+    s = {};
+    VectorIrradiance field;
     if (transfer_.kind == OperatorKind::paper) {
-        if (statistics) *statistics = {};
-        return apply_paper(surface, light);
+        const PointHierarchy& points = transfer_.points;
+        std::vector<float> e(3 * static_cast<std::size_t>(transfer_.senders()));
+        parallel_for(
+            transfer_.senders(),
+            [&](Index m) { Rgb::Map(&e[3 * m]) = direct_irradiance(surface, light, points.point(m)); },
+            256);
+        field = apply_paper(e);
+        s.lit_senders = lit_senders(e);
+        return field;
     }
     const Radiosity direct = direct_radiosity(surface, light);
     if (transfer_.bounces > 0) {
-        if (statistics) *statistics = {transfer_.bounces - 1, 0.0};
-        return gather(some_bounces(direct, transfer_.bounces));
+        s.products = transfer_.bounces - 1;
+        field = gather(some_bounces(direct, transfer_.bounces));
+    } else {
+        field = gather(all_bounces(direct, 2e-3, &s));
     }
-    return gather(all_bounces(direct, 2e-3, statistics));
+    s.lit_senders = lit_senders(direct);
+    return field;
 }
 
 } // namespace afterglow

@@ -55,7 +55,11 @@ using VectorIrradiance = std::vector<float>;
 struct NeumannStatistics {
     int products = 0;      // applications of the bounce operator
     double residual = 0.0; // relative to the first bounce
+    /// Points of the finest sender level on which the light falls directly: by fewer than
+    /// `fewest_lit_senders` it is sampled too coarsely to be trusted.
+    std::uint32_t lit_senders = 0;
 };
+inline constexpr std::uint32_t fewest_lit_senders = 30;
 
 /// The operator at work: direct light in, indirect vector irradiance out. Of the paper's operator,
 /// indirect() alone is there.
@@ -77,7 +81,7 @@ public:
     /// by minimal residuals over its Krylov space (GMRES, Saad and Schultz 1986), each colour by
     /// itself; ends when the residual is below `tolerance` times the first bounce.
     Radiosity all_bounces(const Radiosity& direct, double tolerance = 2e-3,
-                          NeumannStatistics* statistics = nullptr) const;
+                          NeumannStatistics* statistics = nullptr) const; // all but lit_senders
 
     /// The first `count` terms of that sum, one product each but the first.
     Radiosity some_bounces(const Radiosity& direct, int count) const;
@@ -95,7 +99,8 @@ private:
     /// Pulled, differenced and updated, four floats a sender (the last zero).
     std::vector<float> coefficients(const Radiosity& radiosity) const;
     VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
-    VectorIrradiance apply_paper(const Surface& surface, const Spotlight& light) const;
+    VectorIrradiance apply_paper(const std::vector<float>& direct_irradiance) const;
+    std::uint32_t lit_senders(const std::vector<float>& light) const;
 };
 
 } // namespace afterglow

@@ -4,6 +4,7 @@
 #include "transport/display.h"
 #include "transport/transfer_file.h"
 
+#include <cstdio>
 #include <string>
 
 namespace afterglow {
@@ -25,5 +26,14 @@ struct TransferScene {
     TransferScene(const TransferScene&) = delete; // the members refer to each other
     TransferScene& operator=(const TransferScene&) = delete;
 };
+
+/// Says so on stderr where a light falls on so few senders that its indirect light cannot be trusted.
+inline void warn_of_coarse_light(const NeumannStatistics& statistics) {
+    if (statistics.lit_senders < fewest_lit_senders)
+        std::fprintf(stderr,
+                     "afterglow: warning: the light falls on %u points of the finest senders only; "
+                     "its indirect light is not to be trusted\n",
+                     statistics.lit_senders);
+}
 
 } // namespace afterglow

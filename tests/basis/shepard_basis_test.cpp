@@ -160,6 +160,38 @@ TEST(ShepardBasis, GivesWhatStandsBehindAThinWallNextToNothing) {
     EXPECT_LT(leak_seeing, 2e-2 * leak_blind);
 }
 
+TEST(ShepardBasis, SeesASheetThatLiesCloserThanItsLift) {
+    // A sheet a millimetre above the ground, over x > 0; functions at x = -0.3 and 0.5, the point
+    // between them below the sheet: the line of sight to the first meets the sheet's edge, though
+    // walls are looked for two centimetres above open ground.
+    Scene scene = make_ground(10.0f);
+    const auto first = static_cast<std::uint32_t>(scene.positions.size());
+    for (const Vec2& corner : {Vec2(0, -1), Vec2(2, -1), Vec2(2, 1), Vec2(0, 1)})
+        scene.positions.push_back(Vec3(corner.x(), 1e-3f, corner.y()));
+    scene.triangles.push_back({first, first + 2, first + 1});
+    scene.triangles.push_back({first, first + 3, first + 2});
+    scene.material_index.resize(scene.triangles.size(), 0);
+    const Surface surface(scene);
+    PointHierarchy points;
+    points.position.resize(3, 2);
+    points.position << -0.3f, 0.5f, 0.0f, 0.0f, 0.0f, 0.0f;
+    points.normal = Vec3::UnitY().replicate(1, 2);
+    points.support = Eigen::VectorXf::Constant(2, 1.0f);
+    points.level_begin = {0, 2};
+    points.spacing = {0.7f};
+    points.parent_level = {-1};
+    const ShepardBasis basis(points, surface, true);
+    std::vector<BasisEntry> row;
+    basis.evaluate(0, {Vec3(0.1f, 0.0f, 0.0f), Vec3::UnitY()}, row);
+    ASSERT_EQ(row.size(), 1u);
+    EXPECT_EQ(row[0].index, 1u);
+    // On open ground beside the sheet it is the other way round.
+    row.clear();
+    basis.evaluate(0, {Vec3(-0.1f, 0.0f, 0.0f), Vec3::UnitY()}, row);
+    ASSERT_EQ(row.size(), 1u);
+    EXPECT_EQ(row[0].index, 0u);
+}
+
 TEST(ShepardBasis, TakesTheClosestFunctionInSightWhereNoneCovers) {
     const Example example("builtin:two_rooms", 1.0f);
     // Supports so short that hardly anything is covered.

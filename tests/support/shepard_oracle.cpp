@@ -7,9 +7,13 @@ namespace afterglow {
 
 bool behind_a_wall(const PointHierarchy& points, const Surface& surface, const SurfacePoint& x,
                    std::uint32_t j) {
-    const float lift = std::max(0.02f * points.support[j], surface.lift());
-    return surface.blocked(x.position + lift * x.normal,
-                           points.position.col(j) + lift * points.normal.col(j));
+    const auto lifted = [&](const SurfacePoint& p) -> Vec3 {
+        float lift = 0.02f * points.support[j];
+        if (const Hit above = surface.closest_hit({surface.lifted(p), p.normal, lift}))
+            lift = 0.5f * above.distance;
+        return p.position + std::max(lift, surface.lift()) * p.normal;
+    };
+    return surface.blocked(lifted(x), lifted(points.point(j)));
 }
 
 std::map<std::uint32_t, double> shepard_by_formula(const PointHierarchy& points, int level,
