@@ -16,21 +16,28 @@ constexpr float lift_share = 0.02f;
 
 } // namespace
 
-ShepardBasis::ShepardBasis(const PointHierarchy& points, const Surface& surface, bool see_walls)
-    : points_(points), surface_(surface), see_walls_(see_walls), lift_(points.size()) {
-    parallel_for(points.size(), [&](Index j) {
-        lift_[j] = std::max(free_lift(points.point(j), lift_share * points.support[j]),
-                            surface.lift());
+ShepardBasis::ShepardBasis(const PointHierarchy& points, const Surface& surface, bool see_walls,
+                           std::optional<int> only_level)
+    : points_(points), surface_(surface), see_walls_(see_walls), level_(points.levels()) {
+    for (int l = 0; l < points.levels(); ++l)
+        if (!only_level || l == *only_level) prepare(l);
+}
+
+void ShepardBasis::prepare(int level) {
+    const Index begin = points_.begin(level), count = points_.end(level) - points_.begin(level);
+    Level& l = level_[level].emplace();
+    l.tree = RTree(points_.position.middleCols(begin, count), points_.support.segment(begin, count),
+                   points_.begin(level));
+    if (level >= points_.openness_level) l.probe.emplace(surface_, points_.spacing[level]);
+    l.nearest = std::make_unique<NearestPoints>(points_.position.middleCols(begin, count));
+    if (!see_walls_ || count == 0) return;
+    l.highest_lift = lift_share * points_.support.segment(begin, count).maxCoeff();
+    l.lift.resize(static_cast<std::size_t>(count));
+    parallel_for(count, [&](Index k) {
+        const Index j = begin + k;
+        l.lift[k] =
+            std::max(free_lift(points_.point(j), lift_share * points_.support[j]), surface_.lift());
     }, 256);
-    for (int l = 0; l < points.levels(); ++l) {
-        const Index begin = points.begin(l), count = points.end(l) - points.begin(l);
-        tree_.emplace_back(points.position.middleCols(begin, count), points.support.segment(begin, count),
-                           points.begin(l));
-        highest_lift_.push_back(
-            count == 0 ? 0.0f : lift_share * points.support.segment(begin, count).maxCoeff());
-        if (l >= points.openness_level) probe_.emplace_back(surface, points.spacing[l]);
-        nearest_.push_back(std::make_unique<NearestPoints>(points.position.middleCols(begin, count)));
-    }
 }
 
 float ShepardBasis::free_lift(const SurfacePoint& x, float wanted) const {
@@ -38,21 +45,23 @@ float ShepardBasis::free_lift(const SurfacePoint& x, float wanted) const {
     return above ? 0.5f * above.distance : wanted;
 }
 
-bool ShepardBasis::wall_between(const SurfacePoint& x, float lift_of_x, std::uint32_t j) const {
+bool ShepardBasis::wall_between(int level, const SurfacePoint& x, float lift_of_x,
+                                std::uint32_t j) const {
     const float lift = std::max(std::min(lift_of_x, lift_share * points_.support[j]), surface_.lift());
+    const float lift_of_j = level_[level]->lift[j - points_.begin(level)];
     return surface_.blocked(x.position + lift * x.normal,
-                            points_.position.col(j) + lift_[j] * points_.normal.col(j));
+                            points_.position.col(j) + lift_of_j * points_.normal.col(j));
 }
 
 bool ShepardBasis::enclosed(int level, const SurfacePoint& x) const {
     if (level < points_.openness_level) return false;
-    const Openness here = probe_[static_cast<std::size_t>(level - points_.openness_level)](x);
+    const Openness here = (*level_[level]->probe)(x);
     return 1.0f + x.normal.dot(here.tail<3>()) < 0.1f;
 }
 
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
-    tree_[level].containing(x.position, [&](std::uint32_t j, float distance2) {
+    level_[level]->tree.containing(x.position, [&](std::uint32_t j, float distance2) {
         const float cosine = x.normal.dot(points_.normal.col(j));
         if (cosine <= 0.0f) return;
         const float h = (x.position - points_.position.col(j)).dot(points_.normal.col(j));
@@ -84,7 +93,7 @@ void ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
         return openness_likeness(openness_difference2(points_.openness_of(entry.index), any)) > 0.98f;
     });
     if (alike) return;
-    const Openness here = probe_[static_cast<std::size_t>(level - points_.openness_level)](x);
+    const Openness here = (*level_[level]->probe)(x);
     for (BasisEntry& entry : row)
         entry.value *=
             1e-3f
@@ -93,7 +102,7 @@ void ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
 
 std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
                                             std::span<BasisEntry> row) const {
-    const float lift = free_lift(x, highest_lift_[level]);
+    const float lift = free_lift(x, level_[level]->highest_lift);
     std::sort(row.begin(), row.end(), [](const BasisEntry& a, const BasisEntry& b) {
         return a.value != b.value ? a.value > b.value : a.index < b.index;
     });
@@ -101,7 +110,7 @@ std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
     for (BasisEntry& entry : row) {
         if (entry.value < negligible * in_sight) {
             entry.value = 0.0f;
-        } else if (wall_between(x, lift, entry.index)) {
+        } else if (wall_between(level, x, lift, entry.index)) {
             hidden += entry.value;
             entry.value *= -behind_a_wall; // its sign marks it
         } else {
@@ -124,12 +133,13 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
     if (row.size() > first) return;
     std::vector<std::uint32_t> near;
     const float farthest = 4.0f * points_.spacing[level];
-    const float lift = free_lift(x, highest_lift_[level]);
-    nearest_[level]->closest(x.position, 32, near);
+    const float lift = see_walls_ ? free_lift(x, level_[level]->highest_lift) : 0.0f;
+    level_[level]->nearest->closest(x.position, 32, near);
     for (const std::uint32_t k : near) {
         const std::uint32_t j = points_.begin(level) + k;
         if ((x.position - points_.position.col(j)).norm() > farthest) break; // closest first
-        if (x.normal.dot(points_.normal.col(j)) <= 0.1f || wall_between(x, lift, j)) continue;
+        if (x.normal.dot(points_.normal.col(j)) <= 0.1f) continue;
+        if (see_walls_ && wall_between(level, x, lift, j)) continue;
         row.push_back({j, 1.0f});
         return;
     }

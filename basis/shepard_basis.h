@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -33,7 +34,9 @@ using BasisEntry = SparseEntry<float>; // a function and B_j(x)
 class ShepardBasis {
 public:
     /// Keeps references to both, which must outlive it. `see_walls` false: v_j = 1 always.
-    ShepardBasis(const PointHierarchy& points, const Surface& surface, bool see_walls);
+    /// `only_level`: no other will be evaluated.
+    ShepardBasis(const PointHierarchy& points, const Surface& surface, bool see_walls,
+                 std::optional<int> only_level = {});
 
     const PointHierarchy& points() const { return points_; }
     /// Appends the functions of one level with B_j(x) > 0, by increasing id; they sum to 1, or there
@@ -43,19 +46,24 @@ public:
     /// distance of the openness feature; false on levels without.
     bool enclosed(int level, const SurfacePoint& x) const;
     /// As evaluate; where the level does not cover x, the closest function within four times its
-    /// spacing that faces the same side and is not behind a wall gets all the weight. Still empty where there is none.
+    /// spacing that faces the same side and is not behind a wall gets all the weight. Still empty
+    /// where there is none.
     void evaluate_or_nearest(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
 
 private:
     const PointHierarchy& points_;
     const Surface& surface_;
     bool see_walls_;
-    std::vector<float> lift_;         // of each function's centre [world]
-    std::vector<float> highest_lift_; // of a level's functions
-    std::vector<RTree> tree_;
-    std::vector<std::unique_ptr<NearestPoints>> nearest_;
-    std::vector<OpennessProbe> probe_; // a level each, from PointHierarchy::openness_level on
+    struct Level {
+        RTree tree;
+        std::unique_ptr<NearestPoints> nearest;
+        std::optional<OpennessProbe> probe; // from PointHierarchy::openness_level on
+        std::vector<float> lift;            // of each function's centre [world], where walls are seen
+        float highest_lift = 0.0f;
+    };
+    std::vector<std::optional<Level>> level_;
 
+    void prepare(int level);
     /// Weights, not yet scaled to sum to one, times the openness term.
     void favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
     /// Weights times v_j. Sorts the row, largest first, and leaves what is kept at its begin.
@@ -63,7 +71,7 @@ private:
                                   std::span<BasisEntry> row) const;
     /// How high over x to look for walls: `wanted`, or half way to what is closer above it.
     float free_lift(const SurfacePoint& x, float wanted) const;
-    bool wall_between(const SurfacePoint& x, float lift_of_x, std::uint32_t j) const;
+    bool wall_between(int level, const SurfacePoint& x, float lift_of_x, std::uint32_t j) const;
 };
 
 /// Scales the shares of a row so that they sum to one; their sum must not be zero, unless there are

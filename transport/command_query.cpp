@@ -27,27 +27,15 @@ void run(QueryCommand& command) {
     const ThreadLimit limit(command.run.threads);
     const std::vector<SurfacePoint> points = read_points_csv(command.points);
     const TransferScene opened(command.file, command.scene);
-    NeumannStatistics neumann;
-    const VectorIrradiance field =
-        opened.transport.indirect(opened.surface, command.light, &neumann);
-
-    const auto count = static_cast<Index>(points.size());
-    Eigen::Array3Xf irradiance(3, count);
-    std::vector<std::uint8_t> is_uncovered(points.size(), 0);
-    parallel_for(count, [&](Index k) {
-        const auto i = static_cast<std::size_t>(k);
-        bool covered = false;
-        irradiance.col(k) = opened.display.irradiance(points[i], field, covered);
-        is_uncovered[i] = !covered;
-    });
+    const VectorIrradiance field = opened.transport.indirect(command.light);
+    Index uncovered = 0;
+    const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, &uncovered);
     write_irradiance_csv(command.output, irradiance);
 
-    const auto uncovered = std::count(is_uncovered.begin(), is_uncovered.end(), 1);
     if (command.run.quiet) return;
-    warn_of_coarse_light(neumann);
     if (uncovered > 0)
         std::fprintf(stderr, "afterglow: warning: no function covers %lld of %lld points\n",
-                     static_cast<long long>(uncovered), static_cast<long long>(count));
+                     static_cast<long long>(uncovered), static_cast<long long>(points.size()));
 }
 
 } // namespace

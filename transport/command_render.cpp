@@ -60,7 +60,7 @@ void run(RenderCommand& command) {
     NeumannStatistics neumann;
     VectorIrradiance field;
     if (layer != Layer::direct)
-        field = opened.transport.indirect(opened.surface, command.light, &neumann);
+        field = opened.transport.indirect(command.light, &neumann);
     const auto lit = Clock::now();
     RenderedPicture picture = render_picture(opened.surface, opened.display, field, command.light,
                                              command.camera, layer, command.samples);
@@ -70,7 +70,6 @@ void run(RenderCommand& command) {
                 static_cast<float>(command.exposure));
 
     if (command.run.quiet) return;
-    if (layer != Layer::direct) warn_of_coarse_light(neumann);
     if (picture.uncovered_pixels > 0)
         std::fprintf(stderr,
                      "afterglow: warning: %llu pixels show places that no function covers\n",

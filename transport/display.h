@@ -3,7 +3,7 @@
 #include "basis/shepard_basis.h"
 #include "transport/transfer_operator.h"
 
-#include <memory>
+#include <span>
 
 namespace afterglow {
 
@@ -17,7 +17,14 @@ public:
     /// Indirect irradiance [W/m^2] = max(0, n . sum_j B_j(x) V_j); zero and `covered` false where no
     /// function covers x (and, but of the paper's operator, no close point is in sight). `field` as
     /// from LightTransport::indirect.
-    Rgb irradiance(const SurfacePoint& x, const VectorIrradiance& field, bool& covered) const;
+    Rgb irradiance(const SurfacePoint& x, const VectorIrradiance& field, bool& covered) const {
+        return net_irradiance(x, field, covered).max(0.0f);
+    }
+    /// The same before it is clamped at zero.
+    Rgb net_irradiance(const SurfacePoint& x, const VectorIrradiance& field, bool& covered) const;
+    /// At many places at a time, 3 x places; how many are not covered, if that is asked for.
+    Eigen::Array3Xf irradiance(std::span<const SurfacePoint> places, const VectorIrradiance& field,
+                               Index* uncovered = nullptr) const;
 
 private:
     const TransferOperator& transfer_;

@@ -26,6 +26,13 @@ void favour_equal_reflectance(const PointHierarchy& points, const Rgb& at_y,
 
 } // namespace
 
+void sender_row(const Surface& surface, const ShepardBasis& basis, int level, const Hit& hit,
+                std::vector<BasisEntry>& row) {
+    basis.evaluate_or_nearest(level, surface.point(hit), row);
+    favour_equal_reflectance(basis.points(), surface.reflectance(hit), row);
+    drop_small_shares(row);
+}
+
 SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels,
                        float patch_share)
     : surface_(surface), basis_(basis) {
@@ -53,13 +60,14 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
             std::upper_bound(first_.begin(), first_.end(), missing[i]) - first_.begin() - 1);
         const Hit center = grid_[level].center(missing[i] - first_[level]);
         const SurfacePoint x = surface_.point(center);
-        basis_.evaluate_or_nearest(level, x, rows[i]);
+        if (level + 1 == levels())
+            sender_row(surface_, basis_, level, center, rows[i]);
+        else
+            basis_.evaluate_or_nearest(level, x, rows[i]);
         // Where the level has no function, the next coarser speaks for it.
         if (rows[i].empty() && !basis_.enclosed(level, x))
             for (int l = level - 1; l >= 0 && rows[i].empty(); --l)
                 basis_.evaluate(l, x, rows[i]);
-        if (level + 1 == levels())
-            favour_equal_reflectance(basis_.points(), surface_.reflectance(center), rows[i]);
         drop_small_shares(rows[i]);
     });
     for (std::size_t i = 0; i < missing.size(); ++i) {
@@ -124,6 +132,23 @@ PullOperator SenderRows::make_pull_operator() {
     }
     rows.resize(points.begin(levels() - 1));
     return {join_rows(std::move(rows))};
+}
+
+std::vector<float> SenderRows::finest_areas() {
+    const int finest = levels() - 1;
+    const PatchGrid& grid = grid_.back();
+    std::vector<std::uint32_t> seen;
+    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch)
+        if (hits_[patch] > 0) seen.push_back(first_[finest] + patch);
+    require(seen);
+    const std::uint32_t begin = basis_.points().begin(finest);
+    std::vector<double> area(basis_.points().end(finest) - begin, 0.0);
+    for (const std::uint32_t number : seen) {
+        const double of_patch = grid.area(number - first_[finest]);
+        for (const BasisEntry& entry : row(number))
+            if (entry.index >= begin) area[entry.index - begin] += of_patch * entry.value;
+    }
+    return {area.begin(), area.end()};
 }
 
 } // namespace afterglow

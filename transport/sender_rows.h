@@ -53,6 +53,9 @@ public:
     /// which is the same on every level, not the light that leaves, of which some is never seen.
     /// Not to be called concurrently.
     PullOperator make_pull_operator();
+    /// <B_j, 1> of the finest level's functions [world^2], over the patches in which a ray was
+    /// counted. Not to be called concurrently.
+    std::vector<float> finest_areas();
 
     std::size_t made() const { return made_; }
     std::size_t uncovered() const { return uncovered_; } // rows that are empty
@@ -71,5 +74,10 @@ private:
     std::vector<BasisEntry> entries_;
     std::size_t made_ = 0, uncovered_ = 0;
 };
+
+/// Appends the row of a finest level at any hit, not at a patch's centre; none where evaluate_or_nearest
+/// finds none.
+void sender_row(const Surface& surface, const ShepardBasis& basis, int level, const Hit& hit,
+                std::vector<BasisEntry>& row);
 
 } // namespace afterglow

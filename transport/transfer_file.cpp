@@ -19,7 +19,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* format_name = "afterglow transfer";
-constexpr const char* format_version = "3";
+constexpr const char* format_version = "4";
 
 static_assert(sizeof(PackedLink) == 3, "links are mapped as rows of three bytes");
 static_assert(sizeof(RgbLink) == 36, "links are mapped as rows of nine floats");
@@ -84,6 +84,7 @@ public:
             read_solution(result.transfer);
         } else {
             read_push(result.transfer);
+            read_sender_areas(result.transfer);
             read_links(result.transfer);
         }
         read_provenance(result.provenance);
@@ -228,6 +229,15 @@ private:
         transfer.push.parents = rows;
     }
 
+    void read_sender_areas(TransferOperator& transfer) const {
+        const std::uint64_t first = transfer.points.begin(transfer.sender_levels - 1);
+        const auto areas = tensor<float>("senders.area", {transfer.senders() - first});
+        if (!std::all_of(areas.begin(), areas.end(),
+                         [](float x) { return x >= 0.0f && std::isfinite(x); }))
+            fail("has a sender of no finite area");
+        transfer.sender_areas.assign(areas.begin(), areas.end());
+    }
+
     void read_pull(TransferOperator& transfer) const {
         const PointHierarchy& points = transfer.points;
         const SparseRows<float> rows =
@@ -355,6 +365,7 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
         const Links& links = transfer.links;
         add_rows("push", transfer.push.parents);
         add_rows("pull", transfer.pull.children);
+        add("senders.area", {transfer.sender_areas.size()}, std::span(transfer.sender_areas));
         add("links.begin", {count + 1}, links.begin.span());
         add("links.packed", {links.entries(), sizeof(PackedLink)},
             std::span(reinterpret_cast<const std::uint8_t*>(links.entry.data()),

@@ -21,19 +21,19 @@ std::uint64_t TransferOperator::link_count() const {
     return kind == OperatorKind::paper ? solution.entries() : links.count(0, links.rows());
 }
 
-LightTransport::LightTransport(const TransferOperator& transfer)
-    : transfer_(transfer) {}
+LightTransport::LightTransport(const TransferOperator& transfer, const Surface& surface)
+    : transfer_(transfer), surface_(surface) {
+    if (transfer.kind == OperatorKind::neumann)
+        direct_light_.emplace(transfer.points, transfer.sender_levels - 1, transfer.sender_areas,
+                              surface);
+}
 
-Radiosity LightTransport::direct_radiosity(const Surface& surface, const Spotlight& light) const {
+Radiosity LightTransport::direct_radiosity(const Spotlight& light) const {
     const PointHierarchy& points = transfer_.points;
     Radiosity radiosity(3 * static_cast<std::size_t>(transfer_.senders()));
-    parallel_for(
-        transfer_.senders(),
-        [&](Index m) {
-            const Rgb e = direct_irradiance(surface, light, points.point(m));
-            Rgb::Map(&radiosity[3 * m]) = points.reflectance.col(m).array() * e;
-        },
-        256);
+    const std::size_t finest = points.begin(transfer_.sender_levels - 1);
+    direct_light_->radiosity(light, std::span(radiosity).subspan(3 * finest));
+    transfer_.pull.pull(points, transfer_.sender_levels, 3, radiosity);
     return radiosity;
 }
 
@@ -135,40 +135,21 @@ VectorIrradiance LightTransport::apply_paper(const std::vector<float>& direct_ir
     return field;
 }
 
-/// Of the finest level; `light`: three numbers a sender.
-std::uint32_t LightTransport::lit_senders(const std::vector<float>& light) const {
-    std::uint32_t count = 0;
-    for (std::size_t m = transfer_.points.begin(transfer_.sender_levels - 1); m < transfer_.senders(); ++m)
-        count += light[3 * m] > 0.0f || light[3 * m + 1] > 0.0f || light[3 * m + 2] > 0.0f;
-    return count;
-}
-
-VectorIrradiance LightTransport::indirect(const Surface& surface, const Spotlight& light,
+VectorIrradiance LightTransport::indirect(const Spotlight& light,
                                           NeumannStatistics* statistics) const {
-    NeumannStatistics local;
-    NeumannStatistics& s = statistics ? *statistics : local;
-    s = {};
-    VectorIrradiance field;
     if (transfer_.kind == OperatorKind::paper) {
         const PointHierarchy& points = transfer_.points;
         std::vector<float> e(3 * static_cast<std::size_t>(transfer_.senders()));
         parallel_for(
             transfer_.senders(),
-            [&](Index m) { Rgb::Map(&e[3 * m]) = direct_irradiance(surface, light, points.point(m)); },
+            [&](Index m) { Rgb::Map(&e[3 * m]) = direct_irradiance(surface_, light, points.point(m)); },
             256);
-        field = apply_paper(e);
-        s.lit_senders = lit_senders(e);
-        return field;
+        return apply_paper(e);
     }
-    const Radiosity direct = direct_radiosity(surface, light);
-    if (transfer_.bounces > 0) {
-        s.products = transfer_.bounces - 1;
-        field = gather(some_bounces(direct, transfer_.bounces));
-    } else {
-        field = gather(all_bounces(direct, 2e-3, &s));
-    }
-    s.lit_senders = lit_senders(direct);
-    return field;
+    const Radiosity direct = direct_radiosity(light);
+    if (transfer_.bounces == 0) return gather(all_bounces(direct, 2e-3, statistics));
+    if (statistics) *statistics = {.products = transfer_.bounces - 1};
+    return gather(some_bounces(direct, transfer_.bounces));
 }
 
 } // namespace afterglow

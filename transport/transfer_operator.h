@@ -4,11 +4,13 @@
 #include "basis/push.h"
 #include "basis/pyramid.h"
 #include "core/surface.h"
+#include "transport/direct_light.h"
 #include "transport/links.h"
 #include "transport/rgb_links.h"
 #include "transport/spotlight.h"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +36,7 @@ struct TransferOperator {
     int bounces = 0;   // of indirect light, 0: all of them
 
     PushOperator push; // neumann
+    std::vector<float> sender_areas; // neumann: <B_j, 1> of the finest senders [world^2]
     Links links;       // neumann: T
 
     Pyramid pyramid;    // paper: of the senders
@@ -55,23 +58,20 @@ using VectorIrradiance = std::vector<float>;
 struct NeumannStatistics {
     int products = 0;      // applications of the bounce operator
     double residual = 0.0; // relative to the first bounce
-    /// Points of the finest sender level on which the light falls directly: by fewer than
-    /// `fewest_lit_senders` it is sampled too coarsely to be trusted.
-    std::uint32_t lit_senders = 0;
 };
-inline constexpr std::uint32_t fewest_lit_senders = 30;
 
 /// The operator at work: direct light in, indirect vector irradiance out. Of the paper's operator,
 /// indirect() alone is there.
 class LightTransport {
 public:
-    /// Keeps a reference to `transfer`, which must outlive it.
-    explicit LightTransport(const TransferOperator& transfer);
+    /// Keeps references to both, which must outlive it.
+    LightTransport(const TransferOperator& transfer, const Surface& surface);
 
     const TransferOperator& transfer() const { return transfer_; }
 
-    /// Radiosity rho E of the sender points by direct light; one shadow ray where the cone reaches.
-    Radiosity direct_radiosity(const Surface& surface, const Spotlight& light) const;
+    /// Radiosity rho E of the senders by direct light: of the finest as DirectLight has it, of the
+    /// coarser ones pulled from these.
+    Radiosity direct_radiosity(const Spotlight& light) const;
 
     /// One bounce: radiosity of the sender points by light that left them, M f = rho n . push(T e)
     /// with e the coefficients of f.
@@ -81,7 +81,7 @@ public:
     /// by minimal residuals over its Krylov space (GMRES, Saad and Schultz 1986), each colour by
     /// itself; ends when the residual is below `tolerance` times the first bounce.
     Radiosity all_bounces(const Radiosity& direct, double tolerance = 2e-3,
-                          NeumannStatistics* statistics = nullptr) const; // all but lit_senders
+                          NeumannStatistics* statistics = nullptr) const;
 
     /// The first `count` terms of that sum, one product each but the first.
     Radiosity some_bounces(const Radiosity& direct, int count) const;
@@ -91,16 +91,16 @@ public:
 
     /// Indirect vector irradiance at all points under a light, after as many bounces as the operator
     /// says.
-    VectorIrradiance indirect(const Surface& surface, const Spotlight& light,
-                              NeumannStatistics* statistics = nullptr) const;
+    VectorIrradiance indirect(const Spotlight& light, NeumannStatistics* statistics = nullptr) const;
 
 private:
     const TransferOperator& transfer_;
+    const Surface& surface_;
+    std::optional<DirectLight> direct_light_; // neumann
     /// Pulled, differenced and updated, four floats a sender (the last zero).
     std::vector<float> coefficients(const Radiosity& radiosity) const;
     VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
     VectorIrradiance apply_paper(const std::vector<float>& direct_irradiance) const;
-    std::uint32_t lit_senders(const std::vector<float>& light) const;
 };
 
 } // namespace afterglow

@@ -4,7 +4,6 @@
 #include "transport/display.h"
 #include "transport/transfer_file.h"
 
-#include <cstdio>
 #include <string>
 
 namespace afterglow {
@@ -22,18 +21,9 @@ struct TransferScene {
     explicit TransferScene(const std::string& path, const std::string& scene_override = "")
         : file(load_transfer(path)),
           scene(load_transfer_scene(path, file.provenance, scene_override)), surface(scene),
-          transport(file.transfer), display(file.transfer, surface) {}
+          transport(file.transfer, surface), display(file.transfer, surface) {}
     TransferScene(const TransferScene&) = delete; // the members refer to each other
     TransferScene& operator=(const TransferScene&) = delete;
 };
-
-/// Says so on stderr where a light falls on so few senders that its indirect light cannot be trusted.
-inline void warn_of_coarse_light(const NeumannStatistics& statistics) {
-    if (statistics.lit_senders < fewest_lit_senders)
-        std::fprintf(stderr,
-                     "afterglow: warning: the light falls on %u points of the finest senders only; "
-                     "its indirect light is not to be trusted\n",
-                     statistics.lit_senders);
-}
 
 } // namespace afterglow

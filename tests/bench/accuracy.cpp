@@ -117,22 +117,15 @@ void add_measure_options(CLI::App& command, MeasureOptions& options) {
 Eigen::Array3Xf displayed_irradiance(const Surface& surface, const TransferOperator& transfer,
                                      const AccuracyScene& scene,
                                      const std::vector<SurfacePoint>& points, Index& uncovered) {
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     const Display display(transfer, surface);
-    const auto count = static_cast<Index>(points.size());
-    Eigen::Array3Xf irradiance(3, 3 * count);
-    std::vector<std::uint8_t> is_covered(points.size(), 0);
+    Eigen::Array3Xf irradiance(3, 3 * static_cast<Index>(points.size()));
     for (Index l = 0; l < 3; ++l) {
         const VectorIrradiance field =
-            transport.indirect(surface, scene.lights[static_cast<std::size_t>(l)]);
-        parallel_for(count, [&](Index p) {
-            bool covered = false;
-            irradiance.col(3 * p + l) =
-                display.irradiance(points[static_cast<std::size_t>(p)], field, covered);
-            is_covered[static_cast<std::size_t>(p)] = covered;
-        });
+            transport.indirect(scene.lights[static_cast<std::size_t>(l)]);
+        irradiance(Eigen::all, Eigen::seq(l, Eigen::last, 3)) =
+            display.irradiance(points, field, &uncovered);
     }
-    uncovered = std::count(is_covered.begin(), is_covered.end(), 0);
     return irradiance;
 }
 

@@ -41,14 +41,13 @@ double SquaredErrors::root_error() const {
 
 Eigen::Array3Xf indirect_irradiance(const Experiment& experiment, const TransferOperator& transfer,
                                     int bounces) {
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, experiment.surface);
     const Display display(transfer, experiment.surface);
     const auto count = static_cast<Index>(experiment.places.size());
     const auto lights = static_cast<Index>(experiment.lights.size());
     Eigen::Array3Xf indirect(3, count * lights);
     for (Index l = 0; l < lights; ++l) {
-        const Radiosity direct =
-            transport.direct_radiosity(experiment.surface, experiment.lights[l]);
+        const Radiosity direct = transport.direct_radiosity(experiment.lights[l]);
         Radiosity sum = direct;
         if (bounces < 0) {
             sum = transport.all_bounces(direct);

@@ -1,8 +1,5 @@
 #include "tests/stability/comparison.h"
 
-#include "core/parallel.h"
-#include "transport/display.h"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,18 +7,12 @@
 namespace afterglow {
 
 Precomputed::Precomputed(Scene scene, const PrecomputeOptions& options)
-    : scene_(std::move(scene)), surface_(scene_), transfer_(precompute(surface_, options)) {}
+    : scene_(std::move(scene)), surface_(scene_), transfer_(precompute(surface_, options)),
+      transport_(transfer_, surface_), display_(transfer_, surface_) {}
 
 Eigen::Array3Xf Precomputed::indirect(const Spotlight& light,
                                       std::span<const SurfacePoint> places) const {
-    const VectorIrradiance field = LightTransport(transfer_).indirect(surface_, light);
-    const Display display(transfer_, surface_);
-    Eigen::Array3Xf irradiance(3, static_cast<Index>(places.size()));
-    parallel_for(irradiance.cols(), [&](Index p) {
-        bool covered = false;
-        irradiance.col(p) = display.irradiance(places[static_cast<std::size_t>(p)], field, covered);
-    });
-    return irradiance;
+    return display_.irradiance(places, transport_.indirect(light));
 }
 
 Comparison Comparison::part(Index first, Index count) const {

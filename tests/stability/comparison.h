@@ -1,5 +1,6 @@
 #pragma once
 
+#include "transport/display.h"
 #include "transport/path_tracer.h"
 #include "transport/precompute.h"
 
@@ -12,10 +13,14 @@ namespace afterglow {
 class Precomputed {
 public:
     explicit Precomputed(Scene scene, const PrecomputeOptions& options = {});
+    Precomputed(const Precomputed&) = delete; // the members refer to each other
+    Precomputed& operator=(const Precomputed&) = delete;
 
     const Scene& scene() const { return scene_; }
     const Surface& surface() const { return surface_; }
     const TransferOperator& transfer() const { return transfer_; }
+    const LightTransport& transport() const { return transport_; }
+    const Display& display() const { return display_; }
     /// R of the coarsest level [m].
     double coarse_radius() const { return transfer_.points.spacing[0]; }
 
@@ -26,6 +31,8 @@ private:
     Scene scene_;
     Surface surface_;
     TransferOperator transfer_;
+    LightTransport transport_;
+    Display display_;
 };
 
 /// The operator's indirect irradiance at some places and the path tracer's.

@@ -1,7 +1,6 @@
 #include "tests/stability/flicker.h"
 
 #include "core/error.h"
-#include "core/parallel.h"
 #include "transport/display.h"
 
 #include <algorithm>
@@ -66,17 +65,11 @@ Flicker measure_flicker(const Surface& surface, const TransferOperator& transfer
     const auto frame_count = static_cast<Index>(frames.size());
 
     Eigen::ArrayXXd ours(pixels.blocks(), frame_count);
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     const Display display(transfer, surface);
-    Eigen::Array3Xf irradiance(3, pixels.reflectance.cols());
     for (Index f = 0; f < frame_count; ++f) {
-        const VectorIrradiance field =
-            transport.indirect(surface, frames[static_cast<std::size_t>(f)]);
-        parallel_for(irradiance.cols(), [&](Index k) {
-            bool covered = false;
-            irradiance.col(k) =
-                display.irradiance(pixels.at[static_cast<std::size_t>(k)], field, covered);
-        });
+        const VectorIrradiance field = transport.indirect(frames[static_cast<std::size_t>(f)]);
+        const Eigen::Array3Xf irradiance = display.irradiance(pixels.at, field);
         ours.col(f) = pixels.block_means([&](Index k) -> Rgb { return irradiance.col(k); });
     }
 

@@ -1,29 +1,21 @@
 #include "tests/stability/ringing.h"
 
-#include "basis/shepard_basis.h"
 #include "core/parallel.h"
+#include "transport/display.h"
 
 #include <algorithm>
-#include <cassert>
 
 namespace afterglow {
 
 Eigen::Array3Xf unclamped_irradiance(const Surface& surface, const TransferOperator& transfer,
                                      const Spotlight& light, std::span<const SurfacePoint> places) {
-    assert(transfer.kind == OperatorKind::neumann);
-    const VectorIrradiance field = LightTransport(transfer).indirect(surface, light);
-    const ShepardBasis basis(transfer.points, surface, true);
-    const int last = transfer.points.levels() - 1;
-    Eigen::Array3Xf irradiance = Eigen::Array3Xf::Zero(3, static_cast<Index>(places.size()));
+    const VectorIrradiance field = LightTransport(transfer, surface).indirect(light);
+    const Display display(transfer, surface);
+    Eigen::Array3Xf irradiance(3, static_cast<Index>(places.size()));
     parallel_for(irradiance.cols(), [&](Index p) {
-        std::vector<BasisEntry> row;
-        const SurfacePoint& x = places[static_cast<std::size_t>(p)];
-        basis.evaluate_or_nearest(last, x, row);
-        for (const BasisEntry& entry : row) {
-            const float* v = &field[9 * static_cast<std::size_t>(entry.index)];
-            for (int axis = 0; axis < 3; ++axis)
-                irradiance.col(p) += entry.value * x.normal[axis] * Rgb::Map(v + 3 * axis);
-        }
+        bool covered = false;
+        irradiance.col(p) =
+            display.net_irradiance(places[static_cast<std::size_t>(p)], field, covered);
     });
     return irradiance;
 }

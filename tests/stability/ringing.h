@@ -14,7 +14,7 @@ struct Ringing {
 };
 
 /// n . sum_j B_j V_j at the places, 3 x places [W/m^2]: what Display clamps. Zero where no function
-/// covers a place. For OperatorKind::neumann.
+/// covers a place.
 Eigen::Array3Xf unclamped_irradiance(const Surface& surface, const TransferOperator& transfer,
                                      const Spotlight& light, std::span<const SurfacePoint> places);
 

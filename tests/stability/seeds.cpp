@@ -1,6 +1,5 @@
 #include "tests/stability/seeds.h"
 
-#include "core/parallel.h"
 #include "transport/display.h"
 
 #include <cassert>
@@ -26,17 +25,14 @@ OfSeeds indirect_of_seeds(const Setting& setting, std::uint64_t first, int count
     for (int k = 0; k < count; ++k) {
         options.seed = first + static_cast<std::uint64_t>(k);
         const TransferOperator transfer = precompute(surface, options);
-        const LightTransport transport(transfer);
+        const LightTransport transport(transfer, surface);
         const Display display(transfer, surface);
         const auto places = static_cast<Index>(setting.places.size());
         const auto lights = static_cast<Index>(setting.lights.size());
         Eigen::Array3Xf e(3, lights * places);
         for (Index l = 0; l < lights; ++l) {
-            const VectorIrradiance field = transport.indirect(surface, setting.lights[l]);
-            parallel_for(places, [&](Index p) {
-                bool covered = false;
-                e.col(l * places + p) = display.irradiance(setting.places[p], field, covered);
-            });
+            const VectorIrradiance field = transport.indirect(setting.lights[l]);
+            e.middleCols(l * places, places) = display.irradiance(setting.places, field);
         }
         results.push_back(std::move(e));
     }

@@ -38,7 +38,7 @@ TEST(Display, CoversAllThatIsInSightAndIsNeverNegative) {
                         .outer_angle = 30.0f};
         light.check();
         const VectorIrradiance field =
-            LightTransport(example.transfer).indirect(example.surface, light);
+            LightTransport(example.transfer, example.surface).indirect(light);
         int uncovered = 0, black = 0, all = 0;
         for (const SurfacePoint& x :
              points_in_sight(example.surface, *example.scene.viewpoint, 5000, 3)) {

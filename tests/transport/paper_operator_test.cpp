@@ -326,9 +326,9 @@ TEST(PaperOperator, FillsAClosedRoomWithAsManyBouncesAsItHas) {
         options.bounces = bounces;
         options.links.threshold = 1e-4f;
         const TransferOperator transfer = precompute(surface, options);
-        const LightTransport transport(transfer);
+        const LightTransport transport(transfer, surface);
         const Display display(transfer, surface);
-        const VectorIrradiance field = transport.indirect(surface, light);
+        const VectorIrradiance field = transport.indirect(light);
         double direct = 0.0, indirect = 0.0;
         for (const SurfacePoint& x : places) {
             bool covered = false;
@@ -352,7 +352,7 @@ TEST(PaperOperator, LosesLightToItsThreshold) {
         options.links.threshold = threshold;
         const TransferOperator transfer = precompute(surface, options);
         const Display display(transfer, surface);
-        const VectorIrradiance field = LightTransport(transfer).indirect(surface, light);
+        const VectorIrradiance field = LightTransport(transfer, surface).indirect(light);
         double sum = 0.0;
         for (const SurfacePoint& x : points_by_area(scene, 1'000, 3)) {
             bool covered = false;

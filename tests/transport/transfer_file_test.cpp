@@ -43,8 +43,8 @@ TEST(TransferFile, TheSameLightComesOutOfTheFile) {
         const TransferFile loaded = load_transfer(folder.path("a"));
         std::filesystem::remove(folder.path("a")); // what is mapped stays
         const VectorIrradiance before =
-            LightTransport(small->transfer).indirect(small->surface, lamp);
-        EXPECT_EQ(before, LightTransport(loaded.transfer).indirect(small->surface, lamp));
+            LightTransport(small->transfer, small->surface).indirect(lamp);
+        EXPECT_EQ(before, LightTransport(loaded.transfer, small->surface).indirect(lamp));
         EXPECT_GT(*std::max_element(before.begin(), before.end()), 0.0f);
     }
 }
@@ -63,19 +63,19 @@ TEST(TransferFile, TheNumberOfBouncesIsKeptAndObeyed) {
     const TemporaryFolder folder;
     const SmallTransfer& small = small_transfer();
     TransferOperator transfer = small.transfer;
-    const Radiosity direct = LightTransport(transfer).direct_radiosity(small.surface, lamp);
+    const Radiosity direct = LightTransport(transfer, small.surface).direct_radiosity(lamp);
     for (const int bounces : {1, 2}) {
         transfer.bounces = bounces;
         save_transfer(folder.path("a"), transfer, small.provenance);
         const TransferFile loaded = load_transfer(folder.path("a"));
-        const LightTransport transport(loaded.transfer);
+        const LightTransport transport(loaded.transfer, small.surface);
         Radiosity sum = direct;
         if (bounces == 2) {
             const Radiosity second = transport.bounce(direct);
             for (std::size_t i = 0; i < sum.size(); ++i)
                 sum[i] += second[i];
         }
-        EXPECT_EQ(transport.indirect(small.surface, lamp), transport.gather(sum));
+        EXPECT_EQ(transport.indirect(lamp), transport.gather(sum));
     }
 }
 
@@ -137,7 +137,7 @@ TEST(TransferFile, NumPyComputesTheSameProduct) {
         + "' '" + folder.path("radiosity") + "' '" + folder.path("field") + "'";
     ASSERT_EQ(std::system(command.c_str()), 0);
     const std::string bytes = content_of(folder.path("field"));
-    const VectorIrradiance expected = LightTransport(small.transfer).gather(radiosity);
+    const VectorIrradiance expected = LightTransport(small.transfer, small.surface).gather(radiosity);
     ASSERT_EQ(bytes.size(), expected.size() * sizeof(float));
     const float* field = reinterpret_cast<const float*>(bytes.data());
     // Sums of some hundred floats, of which NumPy's are doubles.

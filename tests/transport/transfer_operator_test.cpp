@@ -78,10 +78,10 @@ TEST(LightTransport, FillsAClosedRoomWithRhoOverOneMinusRhoTimesTheDirectLight) 
     for (const auto& [rho, tolerance] :
          {std::pair(0.5, 0.005), std::pair(0.8, 0.01), std::pair(0.95, 0.01)}) {
         transfer.points.reflectance.setConstant(static_cast<float>(rho));
-        const LightTransport transport(transfer);
+        const LightTransport transport(transfer, surface);
         for (const Spotlight& light : lights) {
             NeumannStatistics statistics;
-            const VectorIrradiance field = transport.indirect(surface, light, &statistics);
+            const VectorIrradiance field = transport.indirect(light, &statistics);
             const double exact = rho / (1.0 - rho) * flux(light) / 24.0;
             EXPECT_NEAR(mean_irradiance(display, places, field) / exact, 1.0, tolerance)
                 << "rho " << rho << ", cone " << light.outer_angle;
@@ -96,9 +96,9 @@ TEST(LightTransport, SumsAsManyBouncesAsThereAre) {
     const Scene scene = make_builtin_scene("builtin:furnace:0.95");
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, quick(0.6f));
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     const Radiosity direct = transport.direct_radiosity(
-        surface, spot(Vec3(0.2f, 0.7f, -0.1f), Vec3(0.1f, -1.0f, 0.2f), 20.0f, 45.0f));
+        spot(Vec3(0.2f, 0.7f, -0.1f), Vec3(0.1f, -1.0f, 0.2f), 20.0f, 45.0f));
     Radiosity sum = direct, bounce = direct;
     double share_of_100 = 0.0;
     const VectorIrradiance all = transport.gather(transport.all_bounces(direct, 1e-5));
@@ -123,11 +123,11 @@ TEST(LightTransport, IsLinearInTheLight) {
     const Scene scene = make_builtin_scene("builtin:cornell");
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, quick(0.1f));
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     const Radiosity a = transport.direct_radiosity(
-        surface, spot(Vec3(0.278f, 0.5f, 0.2795f), Vec3(0, -1, 0), 20.0f, 50.0f));
+        spot(Vec3(0.278f, 0.5f, 0.2795f), Vec3(0, -1, 0), 20.0f, 50.0f));
     const Radiosity b = transport.direct_radiosity(
-        surface, spot(Vec3(0.1f, 0.1f, 0.1f), Vec3(1, 1, 1), 10.0f, 30.0f));
+        spot(Vec3(0.1f, 0.1f, 0.1f), Vec3(1, 1, 1), 10.0f, 30.0f));
     Radiosity combined(a.size());
     for (std::size_t i = 0; i < a.size(); ++i)
         combined[i] = 2.0f * a[i] - 0.5f * b[i];
@@ -147,9 +147,9 @@ TEST(LightTransport, BouncesByReflectanceTimesTheGatheredIrradiance) {
     const Scene scene = make_builtin_scene("builtin:cornell");
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, quick(0.1f));
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     const Radiosity direct = transport.direct_radiosity(
-        surface, spot(Vec3(0.278f, 0.5f, 0.2795f), Vec3(0, -1, 0), 20.0f, 50.0f));
+        spot(Vec3(0.278f, 0.5f, 0.2795f), Vec3(0, -1, 0), 20.0f, 50.0f));
     const Radiosity bounce = transport.bounce(direct);
     const VectorIrradiance field = transport.gather(direct);
     ASSERT_EQ(direct.size(), 3 * transfer.senders());
@@ -170,7 +170,7 @@ TEST(LightTransport, OfDarknessIsDark) {
     const Scene scene = make_builtin_scene("builtin:cornell");
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, quick(0.2f));
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     const Radiosity dark(3 * transfer.senders(), 0.0f);
     for (const float v : transport.gather(transport.all_bounces(dark)))
         ASSERT_EQ(v, 0.0f);
@@ -182,14 +182,13 @@ TEST(LightTransport, DoesNotLeakIntoAClosedRoom) {
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, {});
     const Display display(transfer, surface);
-    const LightTransport transport(transfer);
+    const LightTransport transport(transfer, surface);
     std::vector<SurfacePoint> rooms[2];
     for (const SurfacePoint& x : points_by_area(scene, 10'000, 4))
         rooms[x.position.x() > 4.025f].push_back(x);
     for (const int lit : {0, 1}) {
         const float x = lit == 0 ? 2.5f : 5.5f; // towards the wall between the rooms
         const VectorIrradiance field = transport.indirect(
-            surface,
             spot(Vec3(x, 1.4f, 2.0f), Vec3(lit == 0 ? 1.0f : -1.0f, -0.2f, 0.1f), 20.0f, 50.0f));
         for (const auto& room : rooms)
             for (const SurfacePoint& place : room) {
