@@ -50,7 +50,12 @@ PushOperator make_push_operator(const ShepardBasis& basis) {
     for (int l = 1; l < points.levels(); ++l)
         parallel_for(points.end(l) - points.begin(l), [&](Index k) {
             const Index i = points.begin(l) + k;
-            basis.evaluate_or_nearest(points.parent_level[l], points.point(i), rows[i]);
+            const int parent = points.parent_level[l];
+            // No point of a level without openness lies where little can be seen.
+            if (l >= points.openness_level && parent < points.openness_level
+                && is_enclosed(points.normal.col(i), points.openness_of(i)))
+                return;
+            basis.evaluate_or_nearest(parent, points.point(i), rows[i]);
             drop_small_shares(rows[i]);
         });
     return {join_rows(std::move(rows))};

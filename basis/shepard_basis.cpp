@@ -53,10 +53,13 @@ bool ShepardBasis::wall_between(int level, const SurfacePoint& x, float lift_of_
                             points_.position.col(j) + lift_of_j * points_.normal.col(j));
 }
 
+bool ShepardBasis::roofed(int level, const SurfacePoint& x) const {
+    return surface_.occluded({surface_.lifted(x), x.normal, 0.5f * points_.spacing[level]});
+}
+
 bool ShepardBasis::enclosed(int level, const SurfacePoint& x) const {
-    if (level < points_.openness_level) return false;
-    const Openness here = (*level_[level]->probe)(x);
-    return 1.0f + x.normal.dot(here.tail<3>()) < 0.1f;
+    if (level < points_.openness_level || !roofed(level, x)) return false;
+    return is_enclosed(x.normal, (*level_[level]->probe)(x));
 }
 
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
@@ -71,9 +74,12 @@ void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisE
         const float w = kernel(std::sqrt(d2) / r) * cosine_power(cosine, points_.shape.weight_power);
         if (w > 1e-12f) row.push_back({j, w});
     });
-    if (row.size() - first > 1) {
+    if (row.size() > first) {
         const auto candidates = std::span(row).subspan(first);
-        if (level >= points_.openness_level) favour_equal_openness(level, x, candidates);
+        if (level >= points_.openness_level && !favour_equal_openness(level, x, candidates)) {
+            row.resize(first);
+            return;
+        }
         if (see_walls_) row.resize(first + hide_behind_walls(level, x, candidates));
     }
     const auto found = std::span(row).subspan(first);
@@ -82,7 +88,7 @@ void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisE
     make_sum_one(found);
 }
 
-void ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
+bool ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
                                          std::span<BasisEntry> row) const {
     // On open ground all see the same, and x too: no need to look.
     const auto first = std::min_element(
@@ -92,12 +98,17 @@ void ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
     const bool alike = std::all_of(row.begin(), row.end(), [&](const BasisEntry& entry) {
         return openness_likeness(openness_difference2(points_.openness_of(entry.index), any)) > 0.98f;
     });
-    if (alike) return;
+    // Unless x lies in a gap that none of them lies in.
+    if (alike && !roofed(level, x)) return true;
     const Openness here = (*level_[level]->probe)(x);
-    for (BasisEntry& entry : row)
-        entry.value *=
-            1e-3f
-            + openness_likeness(openness_difference2(points_.openness_of(entry.index), here));
+    float most_alike = 0.0f;
+    for (BasisEntry& entry : row) {
+        const float likeness =
+            openness_likeness(openness_difference2(points_.openness_of(entry.index), here));
+        entry.value *= 1e-3f + likeness;
+        most_alike = std::max(most_alike, likeness);
+    }
+    return most_alike > 0.01f || !is_enclosed(x.normal, here);
 }
 
 std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
@@ -130,7 +141,7 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
                                        std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
     evaluate(level, x, row);
-    if (row.size() > first) return;
+    if (row.size() > first || enclosed(level, x)) return;
     std::vector<std::uint32_t> near;
     const float farthest = 4.0f * points_.spacing[level];
     const float lift = see_walls_ ? free_lift(x, level_[level]->highest_lift) : 0.0f;

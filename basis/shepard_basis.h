@@ -65,10 +65,12 @@ private:
 
     void prepare(int level);
     /// Weights, not yet scaled to sum to one, times the openness term.
-    void favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
+    bool favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
     /// Weights times v_j. Sorts the row, largest first, and leaves what is kept at its begin.
     std::size_t hide_behind_walls(int level, const SurfacePoint& x,
                                   std::span<BasisEntry> row) const;
+    /// Whether something lies within half a spacing above x.
+    bool roofed(int level, const SurfacePoint& x) const;
     /// How high over x to look for walls: `wanted`, or half way to what is closer above it.
     float free_lift(const SurfacePoint& x, float wanted) const;
     bool wall_between(int level, const SurfacePoint& x, float lift_of_x, std::uint32_t j) const;

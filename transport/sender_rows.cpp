@@ -64,8 +64,14 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
             sender_row(surface_, basis_, level, center, rows[i]);
         else
             basis_.evaluate_or_nearest(level, x, rows[i]);
+        // Into a gap that no fine function lies in, coarse ones must not shine.
+        if (basis_.enclosed(levels() - 1, x)) {
+            std::vector<BasisEntry> finest;
+            basis_.evaluate(levels() - 1, x, finest);
+            if (finest.empty()) rows[i].clear();
+        }
         // Where the level has no function, the next coarser speaks for it.
-        if (rows[i].empty() && !basis_.enclosed(level, x))
+        else if (rows[i].empty())
             for (int l = level - 1; l >= 0 && rows[i].empty(); --l)
                 basis_.evaluate(l, x, rows[i]);
         drop_small_shares(rows[i]);

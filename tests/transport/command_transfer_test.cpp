@@ -180,17 +180,6 @@ TEST_F(CommandTransfer, QueryIsCloseToTheReference) {
     EXPECT_LT((e - reference).abs().mean(), 0.25f * reference.mean());
 }
 
-TEST_F(CommandTransfer, ALightOnFewSendersIsNotTrusted) {
-    const std::string points = folder.write("p.csv", "0.1,0,0.1,0,1,0\n");
-    const std::string query = "query" + quoted(file()) + " --points" + quoted(points) + " -o"
-                              + quoted(folder.path("a.csv"))
-                              + " --light-position=0.278,0.54,0.2795 --light-direction=0,-1,0"
-                                " --light-intensity 1,1,1 --light-cone ";
-    EXPECT_EQ(run(query + "60,70").err, "");
-    EXPECT_NE(run(query + "0.1,0.2").err.find("finest senders"), std::string::npos);
-    EXPECT_EQ(run(query + "0.1,0.2 --quiet").err, "");
-}
-
 TEST_F(CommandTransfer, PointsThatNothingCoversAreCounted) {
     const std::string points =
         folder.write("p.csv", "0.1,0,0.1,0,1,0\n0.278,0.273,-5,0,0,-1\n0.1,0,0.1,0,-1,0\n");

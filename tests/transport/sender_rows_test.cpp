@@ -215,6 +215,21 @@ TEST(SenderRows, PullConstantsToThemselves) {
     EXPECT_GT(pull.children.entries(), 2 * example.points.begin(2));
 }
 
+TEST(SenderRows, FinestAreasAddUpToTheSurface) {
+    const Example example("builtin:furnace", 0.5f);
+    SenderRows rows(example.surface, example.basis, 3);
+    for (const Hit& hit : hits_on_fronts(example.scene, 20'000, 4))
+        rows.count(hit);
+    const std::vector<float> areas = rows.finest_areas();
+    ASSERT_EQ(areas.size(), example.points.end(2) - example.points.begin(2));
+    double sum = 0.0;
+    for (const float area : areas) {
+        EXPECT_GT(area, 0.0f);
+        sum += area;
+    }
+    EXPECT_NEAR(sum, 24.0, 0.01);
+}
+
 TEST(SenderRows, LeaveFunctionsThatNoRayMetAsTheyAre) {
     const Example example("builtin:furnace", 0.5f);
     SenderRows rows(example.surface, example.basis, 2);

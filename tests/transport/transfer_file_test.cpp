@@ -94,6 +94,7 @@ TransferOperator chain(std::uint32_t count) {
     points.parent_level = {-1};
     transfer.pull.children = join_rows(std::vector<std::vector<BasisEntry>>());
     transfer.push.parents = join_rows(std::vector<std::vector<BasisEntry>>(count));
+    transfer.sender_areas.assign(count, 1.0f);
     LinkPacker packer;
     std::vector<std::uint64_t> begin{0};
     std::vector<PackedLink> links;
