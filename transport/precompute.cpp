@@ -69,10 +69,10 @@ void make_neumann(const Surface& surface, const LinkOptions& links, TransferOper
     SenderRows rows(surface, basis, transfer.sender_levels);
     count_arrivals(surface, rows, transfer.points, links.seed);
     transfer.pull = rows.make_pull_operator();
-    transfer.sender_areas = rows.finest_areas();
     report.pull_seconds = seconds_since(start);
     transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,
                                 report.links);
+    transfer.sender_areas = rows.finest_areas();
 }
 
 void make_paper(const Surface& surface, const LinkOptions& links, TransferOperator& transfer,

@@ -140,17 +140,15 @@ PullOperator SenderRows::make_pull_operator() {
     return {join_rows(std::move(rows))};
 }
 
-std::vector<float> SenderRows::finest_areas() {
+std::vector<float> SenderRows::finest_areas() const {
     const int finest = levels() - 1;
     const PatchGrid& grid = grid_.back();
-    std::vector<std::uint32_t> seen;
-    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch)
-        if (hits_[patch] > 0) seen.push_back(first_[finest] + patch);
-    require(seen);
     const std::uint32_t begin = basis_.points().begin(finest);
     std::vector<double> area(basis_.points().end(finest) - begin, 0.0);
-    for (const std::uint32_t number : seen) {
-        const double of_patch = grid.area(number - first_[finest]);
+    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
+        const std::uint32_t number = first_[finest] + patch;
+        if (place_[number].count == not_made) continue;
+        const double of_patch = grid.area(patch);
         for (const BasisEntry& entry : row(number))
             if (entry.index >= begin) area[entry.index - begin] += of_patch * entry.value;
     }

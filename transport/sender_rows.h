@@ -53,9 +53,9 @@ public:
     /// which is the same on every level, not the light that leaves, of which some is never seen.
     /// Not to be called concurrently.
     PullOperator make_pull_operator();
-    /// <B_j, 1> of the finest level's functions [world^2], over the patches in which a ray was
-    /// counted. Not to be called concurrently.
-    std::vector<float> finest_areas();
+    /// <B_j, 1> of the finest level's functions [world^2], over the patches of which rows were made:
+    /// those that are seen.
+    std::vector<float> finest_areas() const;
 
     std::size_t made() const { return made_; }
     std::size_t uncovered() const { return uncovered_; } // rows that are empty

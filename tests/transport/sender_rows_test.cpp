@@ -218,8 +218,7 @@ TEST(SenderRows, PullConstantsToThemselves) {
 TEST(SenderRows, FinestAreasAddUpToTheSurface) {
     const Example example("builtin:furnace", 0.5f);
     SenderRows rows(example.surface, example.basis, 3);
-    for (const Hit& hit : hits_on_fronts(example.scene, 20'000, 4))
-        rows.count(hit);
+    rows.require(numbers_of(rows, hits_on_fronts(example.scene, 20'000, 4)));
     const std::vector<float> areas = rows.finest_areas();
     ASSERT_EQ(areas.size(), example.points.end(2) - example.points.begin(2));
     double sum = 0.0;
