@@ -56,7 +56,7 @@ inline float openness_likeness(float difference2) {
 /// Whether a point sees hardly anything that is farther than a few spacings, as under a carpet:
 /// n . F < 0.1 for the longest distance.
 inline bool is_enclosed(const Vec3& normal, const Openness& openness) {
-    return 1.0f + normal.dot(openness.tail<3>()) < 0.2f;
+    return 1.0f + normal.dot(openness.tail<3>()) < 0.1f;
 }
 
 } // namespace afterglow
