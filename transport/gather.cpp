@@ -74,18 +74,24 @@ void trace(const Surface& surface, const PointHierarchy& points, Index begin, In
 
 } // namespace
 
-void count_arrivals(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
-                    std::uint64_t seed) {
+std::vector<Hit> arrivals(const Surface& surface, const PointHierarchy& points,
+                          std::uint64_t seed) {
     constexpr int rays = 8;
-    for (int l = 0; l < points.levels(); ++l)
-        if (points.leads_to_display(l))
-            trace(surface, points, points.begin(l), points.end(l), points.begin(l),
-                  GatherDirections(rays, hash64(seed, 0xa4400 + static_cast<std::uint64_t>(l))),
-                  [&](Index, const Eigen::Matrix3Xf&, const std::vector<Ray>&,
-                      const std::vector<Hit>& hits) {
-                      for (const Hit& hit : hits)
-                          if (hit) rows.count(hit);
-                  });
+    std::vector<Hit> all;
+    for (int l = 0; l < points.levels(); ++l) {
+        if (!points.leads_to_display(l)) continue;
+        const std::size_t first = all.size();
+        all.resize(first + static_cast<std::size_t>(points.end(l) - points.begin(l)) * rays);
+        trace(surface, points, points.begin(l), points.end(l), points.begin(l),
+              GatherDirections(rays, hash64(seed, 0xa4400 + static_cast<std::uint64_t>(l))),
+              [&](Index r, const Eigen::Matrix3Xf&, const std::vector<Ray>&,
+                  const std::vector<Hit>& hits) {
+                  std::copy(hits.begin(), hits.end(),
+                            all.begin() + static_cast<std::ptrdiff_t>(first) + r * rays);
+              });
+    }
+    std::erase_if(all, [](const Hit& hit) { return !hit; });
+    return all;
 }
 
 void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,

@@ -54,10 +54,9 @@ private:
     std::array<std::uint32_t, 2> shift_;
 };
 
-/// Counts in `rows` where light arrives from, for SenderRows::make_pull_operator: the ends of 8
-/// rays of every receiver.
-void count_arrivals(const Surface& surface, SenderRows& rows, const PointHierarchy& points,
-                    std::uint64_t seed);
+/// Where light arrives from: the ends of 8 rays of every receiver, in the receivers' order, for
+/// SenderRows::see.
+std::vector<Hit> arrivals(const Surface& surface, const PointHierarchy& points, std::uint64_t seed);
 
 /// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k].
 void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,

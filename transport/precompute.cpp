@@ -67,7 +67,7 @@ void make_neumann(const Surface& surface, const LinkOptions& links, TransferOper
 
     start = Clock::now();
     SenderRows rows(surface, basis, transfer.sender_levels);
-    count_arrivals(surface, rows, transfer.points, links.seed);
+    rows.see(arrivals(surface, transfer.points, links.seed));
     transfer.pull = rows.make_pull_operator();
     report.pull_seconds = seconds_since(start);
     transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,

@@ -44,7 +44,71 @@ SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int le
     }
     if (count >= no_index) throw Error("too many surface patches; choose a larger --coarse-radius");
     place_.resize(count);
-    hits_.resize(grid_.back().patch_count(), 0);
+    is_cut_.resize(count);
+}
+
+int SenderRows::level_of(std::uint32_t number) const {
+    if (number < is_cut_.size())
+        return static_cast<int>(std::upper_bound(first_.begin(), first_.end(), number)
+                                - first_.begin() - 1);
+    return second_level_[number - is_cut_.size()];
+}
+
+Hit SenderRows::centre(std::uint32_t number) const {
+    if (const auto found = centre_.find(number); found != centre_.end()) return found->second;
+    const int level = level_of(number);
+    return grid_[level].center(number - first_[level]);
+}
+
+bool SenderRows::hidden(const Hit& hit, const Hit& centre) const {
+    return surface_.blocked(surface_.lifted(surface_.point(hit)),
+                            surface_.lifted(surface_.point(centre)));
+}
+
+std::uint32_t SenderRows::side_of(const Hit& hit, std::uint32_t first) const {
+    return hidden(hit, centre(first)) ? second_.at(first) : first;
+}
+
+void SenderRows::see(std::span<const Hit> arrivals) {
+    const auto count = static_cast<Index>(arrivals.size());
+    std::vector<std::uint8_t> is_hidden(arrivals.size());
+    for (int l = 0; l < levels(); ++l) {
+        const PatchGrid& grid = grid_[l];
+        parallel_for(count, [&](Index k) {
+            is_hidden[k] = hidden(arrivals[k], grid.center(grid.patch_of(arrivals[k])));
+        });
+        std::vector<bool> in_sight(grid.patch_count());
+        std::vector<std::pair<std::uint32_t, Index>> out_of_sight; // patch, first arrival
+        for (Index k = 0; k < count; ++k) {
+            const std::uint32_t patch = grid.patch_of(arrivals[k]);
+            if (is_hidden[k])
+                out_of_sight.emplace_back(patch, k);
+            else
+                in_sight[patch] = true;
+        }
+        std::sort(out_of_sight.begin(), out_of_sight.end());
+        const auto end = std::unique(out_of_sight.begin(), out_of_sight.end(),
+                                     [](auto& a, auto& b) { return a.first == b.first; });
+        for (auto at = out_of_sight.begin(); at != end; ++at) {
+            const std::uint32_t first = first_[l] + at->first;
+            std::uint32_t number = first;
+            if (in_sight[at->first]) {
+                is_cut_[first] = true;
+                number = static_cast<std::uint32_t>(place_.size());
+                second_[first] = number;
+                second_level_.push_back(static_cast<std::uint8_t>(l));
+                place_.emplace_back();
+            }
+            centre_[number] = arrivals[at->second];
+        }
+    }
+    // Of the finest level, the last: is_hidden is still its.
+    hits_.assign(place_.size() - first_.back(), 0);
+    for (Index k = 0; k < count; ++k) {
+        std::uint32_t number = first_.back() + grid_.back().patch_of(arrivals[k]);
+        if (is_hidden[k] && is_cut_[number]) number = second_.at(number);
+        ++hits_[number - first_.back()];
+    }
 }
 
 void SenderRows::require(std::span<const std::uint32_t> numbers) {
@@ -56,9 +120,8 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
         }
     std::vector<std::vector<BasisEntry>> rows(missing.size());
     parallel_for(static_cast<Index>(missing.size()), [&](Index i) {
-        const int level = static_cast<int>(
-            std::upper_bound(first_.begin(), first_.end(), missing[i]) - first_.begin() - 1);
-        const Hit center = grid_[level].center(missing[i] - first_[level]);
+        const int level = level_of(missing[i]);
+        const Hit center = centre(missing[i]);
         const SurfacePoint x = surface_.point(center);
         if (level + 1 == levels())
             sender_row(surface_, basis_, level, center, rows[i]);
@@ -89,17 +152,18 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
 
 PullOperator SenderRows::make_pull_operator() {
     const PointHierarchy& points = basis_.points();
-    const PatchGrid& finest = grid_.back();
-    std::vector<std::uint32_t> patches; // those that were met
-    for (std::uint32_t patch = 0; patch < finest.patch_count(); ++patch)
-        if (hits_[patch] > 0) patches.push_back(patch);
+    std::vector<std::uint32_t> patches; // rows of the finest level in which rays were counted
+    for (std::uint32_t n = first_.back(); n < place_.size(); ++n)
+        if (hits(n) > 0) patches.push_back(n);
     const auto count = static_cast<Index>(patches.size());
     std::vector<std::vector<std::uint32_t>> seen(levels()); // number of each patch's row on a level
-    for (int l = 0; l < levels(); ++l) {
+    for (int l = 0; l + 1 < levels(); ++l) {
         seen[l].resize(patches.size());
-        parallel_for(count, [&](Index p) { seen[l][p] = number(finest.center(patches[p]), l); });
+        parallel_for(count, [&](Index p) { seen[l][p] = number(centre(patches[p]), l); });
         require(seen[l]);
     }
+    seen.back() = patches;
+    require(patches);
 
     std::vector<std::vector<BasisEntry>> rows(points.end(levels() - 1));
     for (int l = 0; l + 1 < levels(); ++l) {
@@ -110,7 +174,7 @@ PullOperator SenderRows::make_pull_operator() {
             for (const BasisEntry& entry : row(seen[l][p]))
                 if (entry.index >= points.begin(l))
                     sees[entry.index - points.begin(l)].push_back(
-                        {p, static_cast<float>(hits_[patches[p]]) * entry.value});
+                        {p, static_cast<float>(hits(patches[p])) * entry.value});
         ScratchPool<Accumulator<double>> sums(
             [&] { return std::make_unique<Accumulator<double>>(points.end(l + 1), 0.0); });
         parallel_ranges(static_cast<Index>(sees.size()), 64, [&](Index first, Index last) {
@@ -145,12 +209,21 @@ std::vector<float> SenderRows::finest_areas() const {
     const PatchGrid& grid = grid_.back();
     const std::uint32_t begin = basis_.points().begin(finest);
     std::vector<double> area(basis_.points().end(finest) - begin, 0.0);
+    const auto add = [&](std::uint32_t number, double of_row) {
+        if (place_[number].count == not_made) return;
+        for (const BasisEntry& entry : row(number))
+            if (entry.index >= begin) area[entry.index - begin] += of_row * entry.value;
+    };
     for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
         const std::uint32_t number = first_[finest] + patch;
-        if (place_[number].count == not_made) continue;
-        const double of_patch = grid.area(patch);
-        for (const BasisEntry& entry : row(number))
-            if (entry.index >= begin) area[entry.index - begin] += of_patch * entry.value;
+        if (!is_cut_[number]) {
+            add(number, grid.area(patch));
+            continue;
+        }
+        const std::uint32_t second = second_.at(number);
+        const double share = static_cast<double>(hits(second)) / (hits(number) + hits(second));
+        add(number, (1.0 - share) * grid.area(patch));
+        add(second, share * grid.area(patch));
     }
     return {area.begin(), area.end()};
 }

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 namespace afterglow {
@@ -13,6 +14,10 @@ namespace afterglow {
 /// How the field of the senders looks from a surface patch: for each sender level, weights of sender
 /// *values* (see PushOperator) that sum to one. Made on demand, once a patch and level, at the
 /// patch's centre: all hits in a patch see the same row, which is what makes the gather fast.
+///
+/// What stands on a surface cuts its patches: a wall may leave a part on either side, a chair leg
+/// cover the centre. So a patch has a second row where some of the light that arrives comes from
+/// places that do not see the first's, and none of its rows is made where no light comes from.
 ///
 /// On the finest level a weight B_j(y) is multiplied with
 ///
@@ -29,7 +34,8 @@ public:
     int levels() const { return static_cast<int>(grid_.size()); }
     /// The row with which a level sees the patch of a hit.
     std::uint32_t number(const Hit& hit, int level) const {
-        return first_[level] + grid_[level].patch_of(hit);
+        const std::uint32_t n = first_[level] + grid_[level].patch_of(hit);
+        return is_cut_[n] ? side_of(hit, n) : n;
     }
     /// Makes these rows (repetitions allowed, no_index is passed over); not to be called concurrently.
     void require(std::span<const std::uint32_t> numbers);
@@ -44,10 +50,9 @@ public:
         __builtin_prefetch(entries_.data() + place_[number].begin);
         __builtin_prefetch(entries_.data() + place_[number].begin + 8);
     }
-    /// Counts a ray that ends here. May be called concurrently.
-    void count(const Hit& hit) {
-        std::atomic_ref(hits_[grid_.back().patch_of(hit)]).fetch_add(1, std::memory_order_relaxed);
-    }
+    /// Finds the patches that are cut, and counts the rays that end in each; to be called once, before
+    /// all else, with rays such as the gather's.
+    void see(std::span<const Hit> arrivals);
     /// The pull between the levels. Its integrals run over the patches of the finest level, each
     /// weighted with the rays that were counted there: it is the light that arrives at the receivers
     /// which is the same on every level, not the light that leaves, of which some is never seen.
@@ -68,11 +73,23 @@ private:
     const Surface& surface_;
     const ShepardBasis& basis_;
     std::vector<PatchGrid> grid_;       // a level each
-    std::vector<std::uint32_t> first_;  // of a level's rows
+    std::vector<std::uint32_t> first_;  // of a level's rows; after the last level's, the second rows
     std::vector<Place> place_;
-    std::vector<std::uint32_t> hits_;   // a patch of the finest level each
+    std::vector<bool> is_cut_;                                      // a first row each
+    std::unordered_map<std::uint32_t, std::uint32_t> second_;       // rows of patches that are cut
+    std::vector<std::uint8_t> second_level_;                        // a second row each
+    std::unordered_map<std::uint32_t, Hit> centre_;                 // where it is not the patch's own
+    std::vector<std::uint32_t> hits_; // rays counted, from the first of the finest level's rows on
     std::vector<BasisEntry> entries_;
     std::size_t made_ = 0, uncovered_ = 0;
+
+    int level_of(std::uint32_t number) const;
+    Hit centre(std::uint32_t number) const;
+    bool hidden(const Hit& hit, const Hit& centre) const;
+    std::uint32_t side_of(const Hit& hit, std::uint32_t first) const;
+    std::uint32_t hits(std::uint32_t number) const {
+        return hits_.empty() ? 0 : hits_[number - first_.back()];
+    }
 };
 
 /// Appends the row of a finest level at any hit, not at a patch's centre; none where evaluate_or_nearest

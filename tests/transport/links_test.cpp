@@ -30,7 +30,7 @@ struct Example {
           sender_levels(sender_levels_), basis(points, surface, true),
           push(make_push_operator(basis)) {
         SenderRows rows(surface, basis, sender_levels);
-        count_arrivals(surface, rows, points, 1);
+        rows.see(arrivals(surface, points, 1));
         pull = rows.make_pull_operator();
     }
 

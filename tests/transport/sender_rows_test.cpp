@@ -174,8 +174,7 @@ TEST(SenderRows, PullWithoutLosingLight) {
     constexpr int levels = 3;
     SenderRows rows(example.surface, example.basis, levels, 0.25f);
     const std::vector<Hit> hits = hits_on_fronts(example.scene, 20'000, 4);
-    for (const Hit& hit : hits)
-        rows.count(hit);
+    rows.see(hits);
     const PullOperator pull = rows.make_pull_operator();
     ASSERT_EQ(pull.children.rows(), example.points.begin(levels - 1));
 
@@ -205,8 +204,7 @@ TEST(SenderRows, PullWithoutLosingLight) {
 TEST(SenderRows, PullConstantsToThemselves) {
     const Example example("builtin:furnace", 0.5f);
     SenderRows rows(example.surface, example.basis, 3);
-    for (const Hit& hit : hits_on_fronts(example.scene, 5'000, 4))
-        rows.count(hit);
+    rows.see(hits_on_fronts(example.scene, 5'000, 4));
     const PullOperator pull = rows.make_pull_operator();
     std::vector<float> values(example.points.end(2), 2.5f);
     pull.pull(example.points, 3, 1, values);
