@@ -62,17 +62,21 @@ bool ShepardBasis::enclosed(int level, const SurfacePoint& x) const {
     return is_enclosed(x.normal, (*level_[level]->probe)(x));
 }
 
+float ShepardBasis::weight(const SurfacePoint& x, std::uint32_t j) const {
+    const Vec3 n = points_.normal.col(j);
+    const float cosine = x.normal.dot(n);
+    if (cosine <= 0.0f) return 0.0f;
+    const float r = points_.support[j];
+    const float d2 = squashed_distance2(x.position - points_.position.col(j), n);
+    return d2 < r * r
+               ? kernel(std::sqrt(d2) / r) * cosine_power(cosine, points_.shape.weight_power)
+               : 0.0f;
+}
+
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
-    level_[level]->tree.containing(x.position, [&](std::uint32_t j, float distance2) {
-        const float cosine = x.normal.dot(points_.normal.col(j));
-        if (cosine <= 0.0f) return;
-        const float h = (x.position - points_.position.col(j)).dot(points_.normal.col(j));
-        const float r = points_.support[j];
-        const float d2 = distance2 + 8.0f * h * h;
-        if (d2 >= r * r) return;
-        const float w = kernel(std::sqrt(d2) / r) * cosine_power(cosine, points_.shape.weight_power);
-        if (w > 1e-12f) row.push_back({j, w});
+    level_[level]->tree.containing(x.position, [&](std::uint32_t j, float) {
+        if (const float w = weight(x, j); w > 1e-12f) row.push_back({j, w});
     });
     if (row.size() > first) {
         const auto candidates = std::span(row).subspan(first);
@@ -135,6 +139,44 @@ std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
         if (entry.value > 0.0f || (entry.value < 0.0f && !enough))
             row[kept++] = {entry.index, std::abs(entry.value)};
     return kept;
+}
+
+void ShepardBasis::factors(int level, const SurfacePoint& centre, float reach,
+                           std::vector<BasisEntry>& row) const {
+    constexpr float least_cosine = -0.1f; // shading normals turn within the patch
+    const std::size_t first = row.size();
+    level_[level]->tree.within(centre.position, reach, [&](std::uint32_t j, float) {
+        if (centre.normal.dot(points_.normal.col(j)) > least_cosine) row.push_back({j, 1.0f});
+    });
+    const auto found = std::span(row).subspan(first);
+    std::sort(found.begin(), found.end(),
+              [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
+    if (found.empty()) return;
+    if (level >= points_.openness_level && !favour_equal_openness(level, centre, found)) {
+        row.resize(first);
+        return;
+    }
+    if (!see_walls_) return;
+    const float lift = free_lift(centre, level_[level]->highest_lift);
+    float in_sight = 0.0f, hidden = 0.0f; // at the centre
+    for (BasisEntry& entry : found) {
+        const float w = entry.value * weight(centre, entry.index);
+        if (wall_between(level, centre, lift, entry.index)) {
+            hidden += w;
+            entry.value *= -behind_a_wall; // its sign marks it
+        } else {
+            in_sight += w;
+        }
+    }
+    const bool enough = in_sight > 0.01f * hidden;
+    if (in_sight == 0.0f && enclosed(level, centre)) {
+        row.resize(first);
+        return;
+    }
+    std::size_t kept = first;
+    for (const BasisEntry& entry : found)
+        if (entry.value > 0.0f || !enough) row[kept++] = {entry.index, std::abs(entry.value)};
+    row.resize(kept);
 }
 
 void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,

@@ -72,6 +72,24 @@ Hit PatchGrid::center(std::uint32_t patch) const {
     return hit;
 }
 
+std::array<Hit, 4> PatchGrid::corners(std::uint32_t patch) const {
+    const Location at = locate(patch);
+    const Cells& c = cells_[at.triangle];
+    const Hit centre = center(patch);
+    std::array<Hit, 4> corners;
+    for (std::uint32_t k = 0; k < 4; ++k) {
+        float u = static_cast<float>(at.i + (k & 1)) / static_cast<float>(c.along_u);
+        float v = static_cast<float>(at.j + (k >> 1)) / static_cast<float>(c.along_v);
+        const float beyond = std::max(1.0f, u + v); // the third edge
+        u /= beyond;
+        v /= beyond;
+        corners[k] = centre;
+        corners[k].u += 0.98f * (u - centre.u);
+        corners[k].v += 0.98f * (v - centre.v);
+    }
+    return corners;
+}
+
 float PatchGrid::area(std::uint32_t patch) const {
     const Location at = locate(patch);
     const Triangle& corner = scene_.triangles[at.triangle];

@@ -4,7 +4,8 @@
 #include "basis/sparse_rows.h"
 #include "core/surface.h"
 
-#include <atomic>
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -28,6 +29,9 @@ public:
     }
     /// The place that stands for a patch, the centroid of its part of the triangle, as a hit on it.
     Hit center(std::uint32_t patch) const;
+    /// The corners of the patch's part of the triangle, as hits, drawn in towards the centre by a
+    /// fiftieth; two may be the same.
+    std::array<Hit, 4> corners(std::uint32_t patch) const;
     /// Area of the patch's part of its triangle [world^2].
     float area(std::uint32_t patch) const;
 

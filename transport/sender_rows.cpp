@@ -77,29 +77,46 @@ void SenderRows::see(std::span<const Hit> arrivals) {
         parallel_for(count, [&](Index k) {
             is_hidden[k] = hidden(arrivals[k], grid.center(grid.patch_of(arrivals[k])));
         });
-        std::vector<bool> in_sight(grid.patch_count());
-        std::vector<std::pair<std::uint32_t, Index>> out_of_sight; // patch, first arrival
-        for (Index k = 0; k < count; ++k) {
-            const std::uint32_t patch = grid.patch_of(arrivals[k]);
-            if (is_hidden[k])
-                out_of_sight.emplace_back(patch, k);
-            else
-                in_sight[patch] = true;
-        }
-        std::sort(out_of_sight.begin(), out_of_sight.end());
-        const auto end = std::unique(out_of_sight.begin(), out_of_sight.end(),
-                                     [](auto& a, auto& b) { return a.first == b.first; });
-        for (auto at = out_of_sight.begin(); at != end; ++at) {
-            const std::uint32_t first = first_[l] + at->first;
-            std::uint32_t number = first;
-            if (in_sight[at->first]) {
-                is_cut_[first] = true;
-                number = static_cast<std::uint32_t>(place_.size());
-                second_[first] = number;
-                second_level_.push_back(static_cast<std::uint8_t>(l));
-                place_.emplace_back();
+        struct Met {
+            std::uint32_t patch;
+            bool is_hidden;
+            Index arrival;
+            auto operator<=>(const Met&) const = default;
+        };
+        std::vector<Met> met(arrivals.size());
+        for (Index k = 0; k < count; ++k)
+            met[k] = {grid.patch_of(arrivals[k]), is_hidden[k] != 0, k};
+        std::sort(met.begin(), met.end());
+        // Of each patch and side the first.
+        met.erase(std::unique(met.begin(), met.end(),
+                              [](const Met& a, const Met& b) {
+                                  return a.patch == b.patch && a.is_hidden == b.is_hidden;
+                              }),
+                  met.end());
+        // Light may come to a corner though none was counted.
+        std::vector<Hit> hidden_corner(met.size());
+        parallel_for(static_cast<Index>(met.size()), [&](Index m) {
+            if (met[m].is_hidden) return;
+            const Hit centre = grid.center(met[m].patch);
+            for (const Hit& corner : grid.corners(met[m].patch))
+                if (hidden(corner, centre)) hidden_corner[m] = corner;
+        });
+        for (std::size_t m = 0; m < met.size(); ++m) {
+            const std::uint32_t first = first_[l] + met[m].patch;
+            const bool is_last = m + 1 == met.size() || met[m + 1].patch != met[m].patch;
+            if (met[m].is_hidden) { // and none of the patch sees the centre
+                centre_[first] = arrivals[met[m].arrival];
+                continue;
             }
-            centre_[number] = arrivals[at->second];
+            Hit other = hidden_corner[m];
+            if (!is_last) other = arrivals[met[++m].arrival];
+            if (!other) continue;
+            is_cut_[first] = true;
+            const auto second = static_cast<std::uint32_t>(place_.size());
+            second_[first] = second;
+            second_level_.push_back(static_cast<std::uint8_t>(l));
+            place_.emplace_back();
+            centre_[second] = other;
         }
     }
     // Of the finest level, the last: is_hidden is still its.
@@ -221,7 +238,8 @@ std::vector<float> SenderRows::finest_areas() const {
             continue;
         }
         const std::uint32_t second = second_.at(number);
-        const double share = static_cast<double>(hits(second)) / (hits(number) + hits(second));
+        const double counted = hits(number) + hits(second);
+        const double share = counted > 0.0 ? hits(second) / counted : 0.0;
         add(number, (1.0 - share) * grid.area(patch));
         add(second, share * grid.area(patch));
     }
