@@ -74,7 +74,12 @@ float ShepardBasis::weight(const SurfacePoint& x, std::uint32_t j) const {
 }
 
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
+    append(level, x, row);
+}
+
+bool ShepardBasis::append(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
+    bool in_sight = true;
     level_[level]->tree.containing(x.position, [&](std::uint32_t j, float) {
         if (const float w = weight(x, j); w > 1e-12f) row.push_back({j, w});
     });
@@ -82,14 +87,15 @@ void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisE
         const auto candidates = std::span(row).subspan(first);
         if (level >= points_.openness_level && !favour_equal_openness(level, x, candidates)) {
             row.resize(first);
-            return;
+            return false;
         }
-        if (see_walls_) row.resize(first + hide_behind_walls(level, x, candidates));
+        if (see_walls_) row.resize(first + hide_behind_walls(level, x, candidates, in_sight));
     }
     const auto found = std::span(row).subspan(first);
     std::sort(found.begin(), found.end(),
               [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
     make_sum_one(found);
+    return in_sight && !found.empty();
 }
 
 bool ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
@@ -116,7 +122,7 @@ bool ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
 }
 
 std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
-                                            std::span<BasisEntry> row) const {
+                                            std::span<BasisEntry> row, bool& enough) const {
     const float lift = free_lift(x, level_[level]->highest_lift);
     std::sort(row.begin(), row.end(), [](const BasisEntry& a, const BasisEntry& b) {
         return a.value != b.value ? a.value > b.value : a.index < b.index;
@@ -132,7 +138,7 @@ std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
             in_sight += entry.value;
         }
     }
-    const bool enough = in_sight > 0.01f * hidden;
+    enough = in_sight > 0.01f * hidden;
     if (in_sight == 0.0f && enclosed(level, x)) return 0;
     std::size_t kept = 0;
     for (const BasisEntry& entry : row)
@@ -182,8 +188,8 @@ void ShepardBasis::factors(int level, const SurfacePoint& centre, float reach,
 void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
                                        std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
-    evaluate(level, x, row);
-    if (row.size() > first || enclosed(level, x)) return;
+    if (append(level, x, row)) return;
+    if (row.size() == first && enclosed(level, x)) return;
     std::vector<std::uint32_t> near;
     const float farthest = 4.0f * points_.spacing[level];
     const float lift = see_walls_ ? free_lift(x, level_[level]->highest_lift) : 0.0f;
@@ -193,6 +199,7 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
         if ((x.position - points_.position.col(j)).norm() > farthest) break; // closest first
         if (x.normal.dot(points_.normal.col(j)) <= 0.1f) continue;
         if (see_walls_ && wall_between(level, x, lift, j)) continue;
+        row.resize(first);
         row.push_back({j, 1.0f});
         return;
     }

@@ -53,8 +53,8 @@ public:
     /// Whether x sees hardly anything that is farther than a few spacings, n . F < 0.1 for the longest
     /// distance of the openness feature; false on levels without.
     bool enclosed(int level, const SurfacePoint& x) const;
-    /// As evaluate; where the level does not cover x, the closest function within four times its
-    /// spacing that faces the same side and is not behind a wall gets all the weight. Still empty
+    /// As evaluate; where the level does not cover x, or not with functions in sight, the closest function within four times its
+    /// spacing that faces the same side and is not behind a wall gets all the weight. As evaluate
     /// where there is none.
     void evaluate_or_nearest(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
 
@@ -72,11 +72,14 @@ private:
     std::vector<std::optional<Level>> level_;
 
     void prepare(int level);
+    /// As evaluate; whether there is a row in which functions in sight decide.
+    bool append(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
     /// Weights, not yet scaled to sum to one, times the openness term.
     bool favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
     /// Weights times v_j. Sorts the row, largest first, and leaves what is kept at its begin.
-    std::size_t hide_behind_walls(int level, const SurfacePoint& x,
-                                  std::span<BasisEntry> row) const;
+    /// `enough`: whether functions in sight decide.
+    std::size_t hide_behind_walls(int level, const SurfacePoint& x, std::span<BasisEntry> row,
+                                  bool& enough) const;
     /// Whether something lies within half a spacing above x.
     bool roofed(int level, const SurfacePoint& x) const;
     /// How high over x to look for walls: `wanted`, or half way to what is closer above it.

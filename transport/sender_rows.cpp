@@ -72,51 +72,56 @@ std::uint32_t SenderRows::side_of(const Hit& hit, std::uint32_t first) const {
 void SenderRows::see(std::span<const Hit> arrivals) {
     const auto count = static_cast<Index>(arrivals.size());
     std::vector<std::uint8_t> is_hidden(arrivals.size());
+    std::vector<std::uint32_t> order(arrivals.size()); // by patch
     for (int l = 0; l < levels(); ++l) {
         const PatchGrid& grid = grid_[l];
-        parallel_for(count, [&](Index k) {
-            is_hidden[k] = hidden(arrivals[k], grid.center(grid.patch_of(arrivals[k])));
+        std::vector<std::uint32_t> patch_of(arrivals.size());
+        for (Index k = 0; k < count; ++k) {
+            patch_of[k] = grid.patch_of(arrivals[k]);
+            order[k] = static_cast<std::uint32_t>(k);
+        }
+        std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return patch_of[a] != patch_of[b] ? patch_of[a] < patch_of[b] : a < b;
         });
-        struct Met {
-            std::uint32_t patch;
-            bool is_hidden;
-            Index arrival;
-            auto operator<=>(const Met&) const = default;
+        std::vector<std::span<const std::uint32_t>> groups; // arrivals of one patch each
+        for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+            while (end < order.size() && patch_of[order[end]] == patch_of[order[begin]]) ++end;
+            groups.push_back(std::span(order).subspan(begin, end - begin));
+        }
+        struct Sides {
+            Hit first, second; // where it is not the patch's centre; where there is one
         };
-        std::vector<Met> met(arrivals.size());
-        for (Index k = 0; k < count; ++k)
-            met[k] = {grid.patch_of(arrivals[k]), is_hidden[k] != 0, k};
-        std::sort(met.begin(), met.end());
-        // Of each patch and side the first.
-        met.erase(std::unique(met.begin(), met.end(),
-                              [](const Met& a, const Met& b) {
-                                  return a.patch == b.patch && a.is_hidden == b.is_hidden;
-                              }),
-                  met.end());
-        // Light may come to a corner though none was counted.
-        std::vector<Hit> hidden_corner(met.size());
-        parallel_for(static_cast<Index>(met.size()), [&](Index m) {
-            if (met[m].is_hidden) return;
-            const Hit centre = grid.center(met[m].patch);
-            for (const Hit& corner : grid.corners(met[m].patch))
-                if (hidden(corner, centre)) hidden_corner[m] = corner;
+        std::vector<Sides> sides(groups.size());
+        parallel_for(static_cast<Index>(groups.size()), [&](Index g) {
+            const std::uint32_t patch = patch_of[groups[g].front()];
+            Hit centre = grid.center(patch);
+            const auto look_from = [&](const Hit& from) {
+                centre = from;
+                std::uint32_t seen = 0;
+                for (const std::uint32_t k : groups[g])
+                    seen += !(is_hidden[k] = hidden(arrivals[k], centre));
+                return seen;
+            };
+            if (look_from(centre) == 0) look_from(sides[g].first = arrivals[groups[g].front()]);
+            for (const std::uint32_t k : groups[g])
+                if (is_hidden[k]) {
+                    sides[g].second = arrivals[k];
+                    return;
+                }
+            // Light may come to a corner though none was counted.
+            for (const Hit& corner : grid.corners(patch))
+                if (hidden(corner, centre)) sides[g].second = corner;
         });
-        for (std::size_t m = 0; m < met.size(); ++m) {
-            const std::uint32_t first = first_[l] + met[m].patch;
-            const bool is_last = m + 1 == met.size() || met[m + 1].patch != met[m].patch;
-            if (met[m].is_hidden) { // and none of the patch sees the centre
-                centre_[first] = arrivals[met[m].arrival];
-                continue;
-            }
-            Hit other = hidden_corner[m];
-            if (!is_last) other = arrivals[met[++m].arrival];
-            if (!other) continue;
-            is_cut_[first] = true;
+        for (std::size_t g = 0; g < groups.size(); ++g) {
+            const std::uint32_t first = first_[l] + patch_of[groups[g].front()];
+            if (sides[g].first) centre_[first] = sides[g].first;
+            if (!sides[g].second) continue;
             const auto second = static_cast<std::uint32_t>(place_.size());
+            is_cut_[first] = true;
             second_[first] = second;
             second_level_.push_back(static_cast<std::uint8_t>(l));
+            centre_[second] = sides[g].second;
             place_.emplace_back();
-            centre_[second] = other;
         }
     }
     // Of the finest level, the last: is_hidden is still its.
