@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cassert>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -32,10 +31,6 @@ public:
     template <class Visit>
     void containing(const Vec3& x, const Visit& visit) const;
 
-    /// The same for each sphere that comes within `margin` of x.
-    template <class Visit>
-    void within(const Vec3& x, float margin, const Visit& visit) const;
-
     std::size_t node_count() const { return nodes_.size(); }
     std::size_t bytes() const { return nodes_.size() * sizeof(Node) + leaves_.size() * sizeof(Leaf); }
 
@@ -52,23 +47,19 @@ private:
     std::vector<Node> nodes_; // root last
     std::vector<Leaf> leaves_;
 
-    /// Calls visit(leaf) for the leaves whose boxes meet [low, high].
-    template <class Visit>
-    void leaves_meeting(const Vec3& low, const Vec3& high, const Visit& visit) const;
-    static unsigned meeting_mask(const Node& node, const Vec3& low, const Vec3& high);
+    static unsigned inside_mask(const Node& node, const Vec3& x);
     static unsigned inside_mask(const Leaf& leaf, const Vec3& x, std::array<float, width>& distance2);
 };
 
 #ifdef __AVX__
-inline unsigned RTree::meeting_mask(const Node& node, const Vec3& low, const Vec3& high) {
-    __m256 meets = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
+inline unsigned RTree::inside_mask(const Node& node, const Vec3& x) {
+    __m256 inside = _mm256_castsi256_ps(_mm256_set1_epi32(-1));
     for (int a = 0; a < 3; ++a) {
-        meets = _mm256_and_ps(meets, _mm256_cmp_ps(_mm256_load_ps(node.low[a].data()),
-                                                   _mm256_set1_ps(high[a]), _CMP_LE_OQ));
-        meets = _mm256_and_ps(meets, _mm256_cmp_ps(_mm256_set1_ps(low[a]),
-                                                   _mm256_load_ps(node.high[a].data()), _CMP_LE_OQ));
+        const __m256 p = _mm256_set1_ps(x[a]);
+        inside = _mm256_and_ps(inside, _mm256_cmp_ps(_mm256_load_ps(node.low[a].data()), p, _CMP_LE_OQ));
+        inside = _mm256_and_ps(inside, _mm256_cmp_ps(p, _mm256_load_ps(node.high[a].data()), _CMP_LE_OQ));
     }
-    return static_cast<unsigned>(_mm256_movemask_ps(meets));
+    return static_cast<unsigned>(_mm256_movemask_ps(inside));
 }
 
 inline unsigned RTree::inside_mask(const Leaf& leaf, const Vec3& x,
@@ -83,12 +74,12 @@ inline unsigned RTree::inside_mask(const Leaf& leaf, const Vec3& x,
         _mm256_cmp_ps(sum, _mm256_load_ps(leaf.radius2.data()), _CMP_LT_OQ)));
 }
 #else
-inline unsigned RTree::meeting_mask(const Node& node, const Vec3& low, const Vec3& high) {
+inline unsigned RTree::inside_mask(const Node& node, const Vec3& x) {
     unsigned mask = 0;
     for (int k = 0; k < width; ++k) {
-        bool meets = true;
-        for (int a = 0; a < 3; ++a) meets &= node.low[a][k] <= high[a] && low[a] <= node.high[a][k];
-        mask |= static_cast<unsigned>(meets) << k;
+        bool inside = true;
+        for (int a = 0; a < 3; ++a) inside &= node.low[a][k] <= x[a] && x[a] <= node.high[a][k];
+        mask |= static_cast<unsigned>(inside) << k;
     }
     return mask;
 }
@@ -107,49 +98,28 @@ inline unsigned RTree::inside_mask(const Leaf& leaf, const Vec3& x,
 #endif
 
 template <class Visit>
-void RTree::leaves_meeting(const Vec3& low, const Vec3& high, const Visit& visit) const {
+void RTree::containing(const Vec3& x, const Visit& visit) const {
     if (nodes_.empty()) return;
     std::array<std::uint32_t, 128> stack; // a node pushes at most 8; 2^32 spheres are 11 levels deep
     int top = 0;
     stack[top++] = static_cast<std::uint32_t>(nodes_.size() - 1);
     while (top > 0) {
         const Node& node = nodes_[stack[--top]];
-        for (unsigned mask = meeting_mask(node, low, high); mask != 0; mask &= mask - 1) {
+        for (unsigned mask = inside_mask(node, x); mask != 0; mask &= mask - 1) {
             const std::uint32_t child = node.first_child + static_cast<std::uint32_t>(std::countr_zero(mask));
             if (!node.above_leaves) {
                 assert(top < static_cast<int>(stack.size()));
                 stack[top++] = child;
-            } else {
-                visit(leaves_[child]);
+                continue;
+            }
+            const Leaf& leaf = leaves_[child];
+            std::array<float, width> distance2;
+            for (unsigned in = inside_mask(leaf, x, distance2); in != 0; in &= in - 1) {
+                const int k = std::countr_zero(in);
+                visit(leaf.id[k], distance2[k]);
             }
         }
     }
-}
-
-template <class Visit>
-void RTree::containing(const Vec3& x, const Visit& visit) const {
-    leaves_meeting(x, x, [&](const Leaf& leaf) {
-        std::array<float, width> distance2;
-        for (unsigned in = inside_mask(leaf, x, distance2); in != 0; in &= in - 1) {
-            const int k = std::countr_zero(in);
-            visit(leaf.id[k], distance2[k]);
-        }
-    });
-}
-
-template <class Visit>
-void RTree::within(const Vec3& x, float margin, const Visit& visit) const {
-    const Vec3 m = Vec3::Constant(margin);
-    leaves_meeting(x - m, x + m, [&](const Leaf& leaf) {
-        for (int k = 0; k < width; ++k) {
-            const Vec3 offset(x.x() - leaf.center[0][k], x.y() - leaf.center[1][k],
-                              x.z() - leaf.center[2][k]);
-            const float distance2 = offset.squaredNorm();
-            if (leaf.radius2[k] < 0.0f) continue; // an empty place
-            const float reach = std::sqrt(leaf.radius2[k]) + margin;
-            if (distance2 < reach * reach) visit(leaf.id[k], distance2);
-        }
-    });
 }
 
 } // namespace afterglow

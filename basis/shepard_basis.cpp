@@ -147,44 +147,6 @@ std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
     return kept;
 }
 
-void ShepardBasis::factors(int level, const SurfacePoint& centre, float reach,
-                           std::vector<BasisEntry>& row) const {
-    constexpr float least_cosine = -0.1f; // shading normals turn within the patch
-    const std::size_t first = row.size();
-    level_[level]->tree.within(centre.position, reach, [&](std::uint32_t j, float) {
-        if (centre.normal.dot(points_.normal.col(j)) > least_cosine) row.push_back({j, 1.0f});
-    });
-    const auto found = std::span(row).subspan(first);
-    std::sort(found.begin(), found.end(),
-              [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
-    if (found.empty()) return;
-    if (level >= points_.openness_level && !favour_equal_openness(level, centre, found)) {
-        row.resize(first);
-        return;
-    }
-    if (!see_walls_) return;
-    const float lift = free_lift(centre, level_[level]->highest_lift);
-    float in_sight = 0.0f, hidden = 0.0f; // at the centre
-    for (BasisEntry& entry : found) {
-        const float w = entry.value * weight(centre, entry.index);
-        if (wall_between(level, centre, lift, entry.index)) {
-            hidden += w;
-            entry.value *= -behind_a_wall; // its sign marks it
-        } else {
-            in_sight += w;
-        }
-    }
-    const bool enough = in_sight > 0.01f * hidden;
-    if (in_sight == 0.0f && enclosed(level, centre)) {
-        row.resize(first);
-        return;
-    }
-    std::size_t kept = first;
-    for (const BasisEntry& entry : found)
-        if (entry.value > 0.0f || !enough) row[kept++] = {entry.index, std::abs(entry.value)};
-    row.resize(kept);
-}
-
 void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
                                        std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();

@@ -42,23 +42,18 @@ public:
     /// Appends the functions of one level with B_j(x) > 0, by increasing id; they sum to 1, or there
     /// are none where the level does not cover x.
     void evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
-    /// K(d_j(x) / r_j) max(0, n . n_j)^p alone: the weight without o_j and v_j.
-    float weight(const SurfacePoint& x, std::uint32_t j) const;
-    /// For a patch of surface about `centre`: appends the functions of a level that may cover points
-    /// within `reach` of it, with o_j v_j at the centre, by increasing id. Times weight() at any point
-    /// of the patch, and scaled to sum to one, they are the shares that evaluate() gives there, as far
-    /// as openness and walls do not change within the patch.
-    void factors(int level, const SurfacePoint& centre, float reach,
-                 std::vector<BasisEntry>& row) const;
     /// Whether x sees hardly anything that is farther than a few spacings, n . F < 0.1 for the longest
     /// distance of the openness feature; false on levels without.
     bool enclosed(int level, const SurfacePoint& x) const;
-    /// As evaluate; where the level does not cover x, or not with functions in sight, the closest function within four times its
-    /// spacing that faces the same side and is not behind a wall gets all the weight. As evaluate
-    /// where there is none.
+    /// As evaluate; where the level does not cover x, or not with functions in sight, the closest
+    /// function within four times its spacing that faces the same side and is not behind a wall gets
+    /// all the weight, if there is one; none where x is enclosed.
     void evaluate_or_nearest(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
 
 private:
+    /// K(d_j(x) / r_j) max(0, n . n_j)^p alone: the weight without o_j and v_j.
+    float weight(const SurfacePoint& x, std::uint32_t j) const;
+
     const PointHierarchy& points_;
     const Surface& surface_;
     bool see_walls_;

@@ -109,8 +109,15 @@ void SenderRows::see(std::span<const Hit> arrivals) {
                     return;
                 }
             // Light may come to a corner though none was counted.
-            for (const Hit& corner : grid.corners(patch))
-                if (hidden(corner, centre)) sides[g].second = corner;
+            // The farthest is most likely to lie beyond what hides it, not in it.
+            float farthest = 0.0f;
+            for (const Hit& corner : grid.corners(patch)) {
+                const float d = (surface_.point(corner).position - surface_.point(centre).position)
+                                    .squaredNorm();
+                if (d <= farthest || !hidden(corner, centre)) continue;
+                farthest = d;
+                sides[g].second = corner;
+            }
         });
         for (std::size_t g = 0; g < groups.size(); ++g) {
             const std::uint32_t first = first_[l] + patch_of[groups[g].front()];

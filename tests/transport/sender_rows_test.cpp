@@ -149,6 +149,61 @@ TEST(SenderRows, KeepReflectancesApartOnTheFinestLevel) {
     EXPECT_EQ(other[1], 0.0f); // one part in a thousand is a share that drops out
 }
 
+TEST(SenderRows, KeepTheSidesOfAWallApart) {
+    // A wall stands on one ground: a sheet through its patches, or as thick as a third of one so that
+    // some have their centre in it.
+    for (const auto& [left, right] : {std::pair(0.011f, 0.011f), std::pair(0.0f, 0.02f)}) {
+        Scene scene = make_ground(1.0f);
+        for (const float x : {left, right}) {
+            const auto first = static_cast<std::uint32_t>(scene.positions.size());
+            for (const Vec3& corner : {Vec3(x, 0, -1), Vec3(x, 1, -1), Vec3(x, 1, 1), Vec3(x, 0, 1)})
+                scene.positions.push_back(corner);
+            scene.triangles.push_back({first, first + 1, first + 2});
+            scene.triangles.push_back({first, first + 2, first + 3});
+            scene.material_index.insert(scene.material_index.end(), 2, 0);
+        }
+        const Surface surface(scene);
+        constexpr int side = 20, count = side * side;
+        PointHierarchy points;
+        points.position.resize(3, count);
+        for (int i = 0; i < count; ++i)
+            points.position.col(i) =
+                Vec3(0.1f * (i % side) - 0.945f, 0.0f, 0.1f * (i / side) - 0.95f);
+        points.normal = Vec3::UnitY().replicate(1, count);
+        points.support = Eigen::VectorXf::Constant(count, 0.25f);
+        points.reflectance = Eigen::Matrix3Xf::Constant(3, count, 0.5f);
+        points.level_begin = {0, count};
+        points.spacing = {0.1f};
+        points.parent_level = {-1};
+        const ShepardBasis basis(points, surface, true);
+        const auto hits_beside_wall = [&](std::uint64_t seed) {
+            std::vector<Hit> hits = hits_on_fronts(scene, 20'000, seed);
+            std::erase_if(hits, [&](const Hit& hit) {
+                const float x = surface.point(hit).position.x();
+                return hit.primitive > 1 || (left < x && x < right);
+            });
+            return hits;
+        };
+        const std::vector<Hit> hits = hits_beside_wall(2);
+        const auto wrong = [&](SenderRows& rows) {
+            rows.require(numbers_of(rows, hits));
+            return std::count_if(hits.begin(), hits.end(), [&](const Hit& hit) {
+                const float x = surface.point(hit).position.x();
+                const auto row = rows.row(rows.number(hit, 0));
+                EXPECT_FALSE(row.empty());
+                return std::any_of(row.begin(), row.end(), [&](const BasisEntry& entry) {
+                    return (points.position(0, entry.index) > right) != (x > right);
+                });
+            });
+        };
+        SenderRows blind(surface, basis, 1), seeing(surface, basis, 1);
+        seeing.see(hits_beside_wall(3));
+        // Of the last there are only corners of triangles so small that no ray was counted there.
+        EXPECT_GT(wrong(blind), 150) << "of " << hits.size();
+        EXPECT_LT(wrong(seeing), 20) << "of " << hits.size();
+    }
+}
+
 TEST(SenderRows, AreTheSameInWhateverOrderTheyAreMade) {
     const Example example("builtin:cornell", 0.2f);
     SenderRows bit_by_bit(example.surface, example.basis, 3), at_once = bit_by_bit;
