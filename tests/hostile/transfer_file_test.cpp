@@ -154,6 +154,9 @@ TEST(HostileTransferFile, NumbersThatCannotBeAreRefusedThoughTheChecksumsAreRigh
         {"push NaN", set("push.value", 0, nan)},
         {"push negative", set("push.value", 0, -0.5f)},
         {"push huge", set("push.value", 0, 1e30f)},
+        {"sender area NaN", set("senders.area", 0, nan)},
+        {"sender area negative", set("senders.area", 1, -1e-3f)},
+        {"sender area infinite", set("senders.area", 0, infinite)},
     });
 }
 
@@ -275,8 +278,8 @@ TEST(HostileTransferFile, SizesThatDoNotAgreeAreRefused) {
     };
     for (const char* name :
          {"points.position", "points.normal", "points.support", "points.reflectance",
-          "points.openness", "level_begin", "spacing", "push.begin", "push.index", "push.value", "pull.begin", "pull.index",
-          "pull.value", "links.begin", "links.packed"}) {
+          "points.openness", "level_begin", "spacing", "push.begin", "push.index", "push.value",
+          "pull.begin", "pull.index", "pull.value", "senders.area", "links.begin", "links.packed"}) {
         damages[std::string(name) + " is short"] = [=](Parts& p) {
             p.shorten(name, p.tensor(name).shape[0] - 1);
         };

@@ -118,5 +118,31 @@ TEST(PatchGrid, KnowsTheAreaOfEachPatch) {
     }
 }
 
+TEST(PatchGrid, DrawsTheCornersInSoThatTheyLieInTheirPatch) {
+    // Where the third edge cuts a corner off, what is left has it on that edge.
+    const Scene scene = single_triangle({0, 0, 0}, {1, 0, 0}, {0.3f, 0.6f, 0});
+    const PatchGrid grid(scene, 0.21f);
+    int whole = 0;
+    for (std::uint32_t patch = 0; patch < grid.patch_count(); ++patch) {
+        if (!(grid.area(patch) > 1e-6f)) continue;
+        const Hit centre = grid.center(patch);
+        float farthest_u = 0.0f, farthest_v = 0.0f;
+        for (const Hit& corner : grid.corners(patch)) {
+            EXPECT_EQ(corner.primitive, centre.primitive);
+            EXPECT_EQ(corner.back_side, centre.back_side);
+            EXPECT_LE(corner.u + corner.v, 1.0f);
+            farthest_u = std::max(farthest_u, std::abs(corner.u - centre.u));
+            farthest_v = std::max(farthest_v, std::abs(corner.v - centre.v));
+        }
+        // Five columns by four rows.
+        if (grid.area(patch) < 0.99f * 0.6f / 20.0f) continue;
+        ++whole;
+        for (const Hit& corner : grid.corners(patch)) EXPECT_EQ(grid.patch_of(corner), patch);
+        EXPECT_NEAR(farthest_u, 0.98f * 0.1f, 1e-4f);
+        EXPECT_NEAR(farthest_v, 0.98f * 0.125f, 1e-4f);
+    }
+    EXPECT_GT(whole, 4);
+}
+
 } // namespace
 } // namespace afterglow
