@@ -12,6 +12,10 @@
 #include <span>
 #include <vector>
 
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
+
 namespace afterglow {
 
 /// A link's x, y, z and a lane that is zero.
@@ -107,17 +111,31 @@ struct Links {
             const std::uint32_t bits = bits_of(packed);
             sender += step_of(bits);
             if (is_jump(bits)) continue;
-            const auto component = [&](int c) {
-                return static_cast<float>(static_cast<std::int32_t>(bits << (16 - 4 * c)) >> 28);
-            };
-            visit(sender, LinkVector(component(0), component(1), component(2), 0.0f)
-                              * LinkPacker::step_of(bits >> 7 & 31u));
+            visit(sender, vector_of(bits));
         }
     }
 
     /// What the bits of an entry say: whether it is a jump, and how many senders further it leads.
     static bool is_jump(std::uint32_t bits) { return bits >> 12 == 0; }
     static std::uint32_t step_of(std::uint32_t bits) { return is_jump(bits) ? bits : bits & 127u; }
+    /// The link of an entry that is not a jump.
+    static LinkVector vector_of(std::uint32_t bits) {
+        const float step = LinkPacker::step_of(bits >> 7 & 31u);
+#ifdef __AVX2__
+        // Each component's four bits to the top of its lane, then down again with their sign.
+        const __m128i top = _mm_sllv_epi32(_mm_set1_epi32(static_cast<int>(bits)),
+                                           _mm_setr_epi32(16, 12, 8, 0));
+        const __m128 steps = _mm_cvtepi32_ps(_mm_srai_epi32(top, 28));
+        LinkVector link;
+        _mm_store_ps(link.data(), _mm_mul_ps(steps, _mm_set1_ps(step)));
+        return link;
+#else
+        const auto component = [&](int c) {
+            return static_cast<float>(static_cast<std::int32_t>(bits << (16 - 4 * c)) >> 28);
+        };
+        return step * LinkVector(component(0), component(1), component(2), 0.0f);
+#endif
+    }
     static std::uint32_t bits_of(const PackedLink& packed) {
         return packed[0] | static_cast<std::uint32_t>(packed[1]) << 8
                | static_cast<std::uint32_t>(packed[2]) << 16;
