@@ -94,10 +94,7 @@ Radiosity LightTransport::all_bounces(const Radiosity& direct, double tolerance,
                                       NeumannStatistics* statistics) const {
     const KrylovResult result = solve_second_kind(
         [&](const std::vector<float>& f) { return bounce(f); }, direct, 3, tolerance);
-    if (statistics) {
-        statistics->products = result.products;
-        statistics->residual = result.residual;
-    }
+    if (statistics) *statistics = {result.products, result.residual};
     return result.solution;
 }
 
@@ -138,6 +135,7 @@ VectorIrradiance LightTransport::apply_paper(const std::vector<float>& direct_ir
 VectorIrradiance LightTransport::indirect(const Spotlight& light,
                                           NeumannStatistics* statistics) const {
     if (transfer_.kind == OperatorKind::paper) {
+        if (statistics) *statistics = {};
         const PointHierarchy& points = transfer_.points;
         std::vector<float> e(3 * static_cast<std::size_t>(transfer_.senders()));
         parallel_for(

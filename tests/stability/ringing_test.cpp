@@ -1,6 +1,7 @@
 #include "core/builtin_scenes.h"
 #include "tests/stability/ringing.h"
 #include "tests/support/surface_samples.h"
+#include "transport/display.h"
 #include "transport/precompute.h"
 
 #include <gtest/gtest.h>
@@ -27,6 +28,15 @@ TEST(Ringing, IsRareAndSmallUnderALampInBrightRooms) {
         const Ringing ringing = ringing_of(unclamped);
         EXPECT_LE(ringing.negative_share, 1e-3) << c.scene;
         EXPECT_LE(ringing.largest, 1e-2) << c.scene;
+
+        // It is what Display clamps.
+        const VectorIrradiance field = LightTransport(transfer, surface).indirect(light);
+        const Display display(transfer, surface);
+        for (std::size_t p = 0; p < places.size(); p += 100) {
+            bool covered = false;
+            const Rgb clamped = display.irradiance(places[p], field, covered);
+            EXPECT_TRUE(clamped.isApprox(unclamped.col(static_cast<Index>(p)).max(0.0f), 1e-4f));
+        }
     }
 }
 
