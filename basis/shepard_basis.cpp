@@ -62,27 +62,34 @@ bool ShepardBasis::enclosed(int level, const SurfacePoint& x) const {
     return is_enclosed(x.normal, (*level_[level]->probe)(x));
 }
 
-float ShepardBasis::weight(const SurfacePoint& x, std::uint32_t j) const {
+float ShepardBasis::weight(const SurfacePoint& x, std::uint32_t j, float reach) const {
     const Vec3 n = points_.normal.col(j);
     const float cosine = x.normal.dot(n);
     if (cosine <= 0.0f) return 0.0f;
     const float r = points_.support[j];
     const float d2 = squashed_distance2(x.position - points_.position.col(j), n);
-    return d2 < r * r
-               ? kernel(std::sqrt(d2) / r) * cosine_power(cosine, points_.shape.weight_power)
-               : 0.0f;
+    if (d2 >= (r + reach) * (r + reach)) return 0.0f;
+    return kernel(std::max(0.0f, std::sqrt(d2) - reach) / r)
+           * cosine_power(cosine, points_.shape.weight_power);
 }
 
 void ShepardBasis::evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
-    append(level, x, row);
+    const std::size_t first = row.size();
+    append(level, x, 0.0f, row);
+    make_sum_one(std::span(row).subspan(first));
 }
 
-bool ShepardBasis::append(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const {
+bool ShepardBasis::append(int level, const SurfacePoint& x, float reach,
+                          std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
     bool in_sight = true;
-    level_[level]->tree.containing(x.position, [&](std::uint32_t j, float) {
-        if (const float w = weight(x, j); w > 1e-12f) row.push_back({j, w});
-    });
+    const auto add = [&](std::uint32_t j, float) {
+        if (const float w = weight(x, j, reach); w > 1e-12f) row.push_back({j, w});
+    };
+    if (reach > 0.0f)
+        level_[level]->tree.within(x.position, reach, add);
+    else
+        level_[level]->tree.containing(x.position, add);
     if (row.size() > first) {
         const auto candidates = std::span(row).subspan(first);
         if (level >= points_.openness_level && !favour_equal_openness(level, x, candidates)) {
@@ -94,7 +101,6 @@ bool ShepardBasis::append(int level, const SurfacePoint& x, std::vector<BasisEnt
     const auto found = std::span(row).subspan(first);
     std::sort(found.begin(), found.end(),
               [](const BasisEntry& a, const BasisEntry& b) { return a.index < b.index; });
-    make_sum_one(found);
     return in_sight && !found.empty();
 }
 
@@ -150,8 +156,42 @@ std::size_t ShepardBasis::hide_behind_walls(int level, const SurfacePoint& x,
 void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
                                        std::vector<BasisEntry>& row) const {
     const std::size_t first = row.size();
-    if (append(level, x, row)) return;
-    if (row.size() == first && enclosed(level, x)) return;
+    if (!append(level, x, 0.0f, row)) take_nearest(level, x, first, row);
+    make_sum_one(std::span(row).subspan(first));
+}
+
+void ShepardBasis::factors(int level, const SurfacePoint& x, float reach,
+                           std::vector<BasisEntry>& found) const {
+    const std::size_t first = found.size();
+    if (!append(level, x, reach, found) && take_nearest(level, x, first, found)) return;
+    for (BasisEntry& entry : std::span(found).subspan(first))
+        entry.value /= weight(x, entry.index, reach);
+}
+
+void ShepardBasis::apply_factors(std::span<const BasisEntry> factors, const SurfacePoint& y,
+                                 std::vector<BasisEntry>& row) const {
+    const std::size_t first = row.size();
+    for (const BasisEntry& entry : factors)
+        if (const float w = weight(y, entry.index, 0.0f) * entry.value; w > 0.0f)
+            row.push_back({entry.index, w});
+    if (row.size() == first && !factors.empty()) {
+        const auto distance2 = [&](const BasisEntry& entry) {
+            const Index j = entry.index;
+            return squashed_distance2(y.position - points_.position.col(j), points_.normal.col(j))
+                   / (points_.support[j] * points_.support[j]);
+        };
+        const auto closest = std::min_element(factors.begin(), factors.end(),
+                                              [&](const BasisEntry& a, const BasisEntry& b) {
+                                                  return distance2(a) < distance2(b);
+                                              });
+        row.push_back({closest->index, 1.0f});
+    }
+    make_sum_one(std::span(row).subspan(first));
+}
+
+bool ShepardBasis::take_nearest(int level, const SurfacePoint& x, std::size_t first,
+                                std::vector<BasisEntry>& row) const {
+    if (row.size() == first && enclosed(level, x)) return false;
     std::vector<std::uint32_t> near;
     const float farthest = 4.0f * points_.spacing[level];
     const float lift = see_walls_ ? free_lift(x, level_[level]->highest_lift) : 0.0f;
@@ -163,8 +203,9 @@ void ShepardBasis::evaluate_or_nearest(int level, const SurfacePoint& x,
         if (see_walls_ && wall_between(level, x, lift, j)) continue;
         row.resize(first);
         row.push_back({j, 1.0f});
-        return;
+        return true;
     }
+    return false;
 }
 
 void make_sum_one(std::span<BasisEntry> row) {

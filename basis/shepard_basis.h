@@ -49,10 +49,19 @@ public:
     /// function within four times its spacing that faces the same side and is not behind a wall gets
     /// all the weight, if there is one; none where x is enclosed.
     void evaluate_or_nearest(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
+    /// What is costly in a row, for use at all places close to x: appends o_j(x) v_j(x), up to a
+    /// factor that they share, of the functions that have a weight anywhere within `reach` of x
+    /// [world], by increasing id.
+    void factors(int level, const SurfacePoint& x, float reach, std::vector<BasisEntry>& found) const;
+    /// Appends the row of evaluate_or_nearest at y, as far as factors that were found close to it tell:
+    /// K(d_j(y) / r_j) max(0, n_y . n_j)^p times these, scaled to sum to one. Where all are zero, the
+    /// closest of the functions has it all.
+    void apply_factors(std::span<const BasisEntry> factors, const SurfacePoint& y,
+                       std::vector<BasisEntry>& row) const;
 
 private:
-    /// K(d_j(x) / r_j) max(0, n . n_j)^p alone: the weight without o_j and v_j.
-    float weight(const SurfacePoint& x, std::uint32_t j) const;
+    /// K(d / r_j) max(0, n . n_j)^p alone: the weight without o_j and v_j; d is d_j(x), less `reach`.
+    float weight(const SurfacePoint& x, std::uint32_t j, float reach) const;
 
     const PointHierarchy& points_;
     const Surface& surface_;
@@ -67,8 +76,13 @@ private:
     std::vector<std::optional<Level>> level_;
 
     void prepare(int level);
-    /// As evaluate; whether there is a row in which functions in sight decide.
-    bool append(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
+    /// Weights w_j(x) o_j(x) v_j(x), not yet scaled, by increasing id, of functions within `reach`;
+    /// whether there are some and functions in sight decide.
+    bool append(int level, const SurfacePoint& x, float reach, std::vector<BasisEntry>& row) const;
+    /// Puts the closest function in sight, if there is one, in the stead of the entries from `first`
+    /// on; whether it did.
+    bool take_nearest(int level, const SurfacePoint& x, std::size_t first,
+                      std::vector<BasisEntry>& row) const;
     /// Weights, not yet scaled to sum to one, times the openness term.
     bool favour_equal_openness(int level, const SurfacePoint& x, std::span<BasisEntry> row) const;
     /// Weights times v_j. Sorts the row, largest first, and leaves what is kept at its begin.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 
 namespace afterglow {
@@ -102,6 +103,31 @@ TEST(RTree, AnswersForEveryNumberOfSpheresAroundItsWidth) {
     for (const int count : {0, 1, 2, 7, 8, 9, 15, 63, 64, 65, 512, 513})
         expect_same_as_brute_force(uniform_spheres(count, 0.5f, 5), 200,
                                    std::to_string(count) + " spheres");
+}
+
+TEST(RTree, FindsWithinAReachWhatContainsXWhenItGrowsByIt) {
+    const Spheres spheres = uniform_spheres(2000, 0.1f, 6);
+    const RTree tree(spheres.center, spheres.radius, 0);
+    Rng rng(7, 0);
+    for (const float reach : {0.0f, 0.01f, 0.3f}) {
+        const RTree grown(spheres.center, spheres.radius.array() + reach, 0);
+        for (int q = 0; q < 300; ++q) {
+            const Vec3 x = random_place(rng);
+            std::set<std::uint32_t> found, expected;
+            // Rounding decides where the surface of a sphere passes through x.
+            const auto unclear = [&](std::uint32_t i) {
+                return std::abs((spheres.center.col(i) - x).norm() - spheres.radius[i] - reach) < 1e-6f;
+            };
+            tree.within(x, reach, [&](std::uint32_t i, float distance2) {
+                EXPECT_NEAR(distance2, (spheres.center.col(i) - x).squaredNorm(), 1e-6f);
+                if (!unclear(i)) found.insert(i);
+            });
+            grown.containing(x, [&](std::uint32_t i, float) {
+                if (!unclear(i)) expected.insert(i);
+            });
+            ASSERT_EQ(found, expected) << "reach " << reach;
+        }
+    }
 }
 
 TEST(RTree, ContainsNothingWhenItIsEmpty) {

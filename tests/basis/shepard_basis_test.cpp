@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -223,6 +224,34 @@ TEST(ShepardBasis, TakesTheClosestFunctionInSightWhereNoneCovers) {
     }
     EXPECT_GT(filled, 1000);
     EXPECT_GT(walls_avoided, 0) << "the closest was always in sight: the test shows nothing";
+}
+
+TEST(ShepardBasis, FactorsFoundAtAPlaceMakeItsRow) {
+    const Example example("builtin:cornell", 0.12f);
+    const ShepardBasis basis(example.points, example.surface, true);
+    std::vector<BasisEntry> factors, row, expected;
+    int nearest = 0;
+    for (const SurfacePoint& x :
+         points_in_sight(example.surface, *example.scene.viewpoint, 2000, 8))
+        for (int level = 0; level < 3; ++level)
+            // Within a reach there are more functions, which weigh nothing here.
+            for (const float reach : {0.0f, 0.2f * example.points.spacing[level]}) {
+                factors.clear();
+                row.clear();
+                expected.clear();
+                basis.factors(level, x, reach, factors);
+                basis.apply_factors(factors, x, row);
+                basis.evaluate_or_nearest(level, x, expected);
+                nearest += expected.size() == 1;
+                float difference = 0.0f;
+                std::map<std::uint32_t, float> values;
+                for (const BasisEntry& entry : row) values[entry.index] += entry.value;
+                for (const BasisEntry& entry : expected) values[entry.index] -= entry.value;
+                for (const auto& [j, value] : values) difference += std::abs(value);
+                // Below 1e-3 of those in sight, functions are left out or not by their largest weight.
+                EXPECT_LT(difference, reach == 0.0f ? 1e-5f : 0.02f) << "at " << x.position.transpose();
+            }
+    EXPECT_GT(nearest, 10) << "no place without functions: the test shows nothing";
 }
 
 TEST(ShepardBasis, AppendsToARow) {
