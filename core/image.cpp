@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/tone_map.h"
 
 #include <ImathBox.h>
 #include <ImfChannelList.h>
@@ -79,38 +80,6 @@ std::string encode_exr(const Image& image, PixelType type) {
     }
     return stream.str();
 }
-
-float luminance(const Rgb& c) {
-    return 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
-}
-
-/// Reinhard, Stark, Shirley and Ferwerda 2002, eqs. (1), (2) and (4): luminance is scaled so that
-/// its log-average becomes `key`, then compressed so that the brightest pixel becomes white. Black
-/// pixels (nothing seen) stay out of the average, and a picture darker than white is not brightened
-/// (white is at least 1, where eq. (4) is the identity).
-struct ToneMap {
-    float scale = 1.0f, white = 1.0f;
-
-    ToneMap(const Image& image, float key) {
-        double sum_of_logs = 0.0;
-        float largest = 0.0f;
-        std::size_t count = 0;
-        for (std::size_t i = 0; i < pixel_count(image); ++i) {
-            const float l = luminance(Rgb::Map(&image.rgb[3 * i]));
-            if (!(l > 0.0f) || !std::isfinite(l)) continue;
-            sum_of_logs += std::log(l);
-            largest = std::max(largest, l);
-            ++count;
-        }
-        if (count == 0) return;
-        scale = static_cast<float>(key / std::exp(sum_of_logs / static_cast<double>(count)));
-        white = std::max(1.0f, scale * largest);
-    }
-    Rgb operator()(const Rgb& c) const {
-        const float l = std::max(0.0f, scale * luminance(c));
-        return c * scale * (1.0f + l / (white * white)) / (1.0f + l);
-    }
-};
 
 unsigned char srgb_byte(float linear) {
     if (!(linear > 0.0f)) return 0; // NaN as well

@@ -27,6 +27,7 @@ public:
     void set(const VectorIrradiance& field);
 
     std::uint32_t first() const { return first_; } // id of the first function
+    int weight_power() const { return weight_power_; } // p of ShepardBasis
     std::span<const DisplayFunction> functions() const { return functions_; }
 
     /// Indirect irradiance of each pixel [W/m^2], and 1 where it is covered: what Display::irradiance

@@ -18,7 +18,8 @@ struct PixelSurfaces {
     float pixel_size = 0.0f;  // of a pixel at distance one, 2 tan(fov / 2) / height
     std::span<const Float4> position; // [world]; the fourth is not looked at
     std::span<const Float4> normal;   // unit length, of interpolated normals, on the viewer's side
-    std::span<const std::uint32_t> surface; // 2 * triangle + back side; no_index: nothing is there
+    std::span<const std::uint32_t> surface; // 2 * triangle + back side, however they are numbered;
+                                            // no_index: nothing is there
 
     SurfacePoint point(std::size_t pixel) const {
         return {Vec3::Map(position[pixel].data()), Vec3::Map(normal[pixel].data())};

@@ -1,0 +1,148 @@
+#include "viewer/geometry_buffer.h"
+
+#include <array>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+const char* const vertex_shader = R"(
+in vec3 position;
+in vec3 normal;
+in vec2 uv;
+uniform mat4 projection;
+uniform vec3 eye;
+out vec3 x;
+out vec3 shading;
+out vec2 place;
+flat out vec3 from_eye; // to a corner: tells the side more surely than a place in between
+void main() {
+    x = position;
+    from_eye = position - eye;
+    shading = normal;
+    place = uv;
+    gl_Position = projection * vec4(from_eye, 1.0);
+}
+)";
+
+// The normal's side and when it gives way to the triangle's own: as Surface::point.
+const char* const fragment_shader = R"(
+in vec3 x;
+in vec3 shading;
+in vec2 place;
+flat in vec3 from_eye;
+uniform vec3 eye;
+uniform mat3 ray; // direction of the ray through (x, y), in pixels: ray * (x, y, 1)
+uniform uint first_triangle;
+uniform samplerBuffer triangles;
+uniform vec3 reflectance;
+uniform bool is_textured;
+uniform sampler2D image;
+out vec4 out_position;
+out vec4 out_normal;
+out vec4 out_reflectance;
+out uint out_surface;
+void main() {
+    uint triangle = first_triangle + uint(gl_PrimitiveID);
+    vec3 geometric = texelFetch(triangles, int(triangle)).xyz;
+    bool back_side = dot(geometric, from_eye) > 0.0;
+    float side = back_side ? -1.0 : 1.0;
+    geometric *= side;
+    float size = length(shading);
+    vec3 n = size > 1e-3 ? side / size * shading : geometric;
+    if (dot(n, geometric) <= 0.01) n = geometric;
+    // Interpolation is not exact enough to start rays from: they would meet their own triangle.
+    vec3 direction = ray * vec3(gl_FragCoord.xy, 1.0);
+    float slope = dot(direction, geometric);
+    vec3 place_on_plane = eye + dot(from_eye, geometric) / slope * direction;
+    out_position = vec4(abs(slope) > 1e-5 ? place_on_plane : x, 1.0);
+    out_normal = vec4(n, 0.0);
+    out_reflectance = vec4(reflectance, 1.0);
+    if (is_textured) out_reflectance.rgb *= texture(image, place).rgb;
+    out_surface = 2u * triangle + (back_side ? 1u : 0u);
+}
+)";
+
+/// Directions through pixels, not of unit length, as Camera::direction has them; through
+/// (x, y) + shift where (x, y) is asked for.
+Eigen::Matrix3f pixel_rays(const Camera& camera, const Vec2& shift) {
+    const Vec3 forward = (camera.target - camera.position).stableNormalized();
+    const Vec3 right = forward.cross(camera.up.stableNormalized()).normalized();
+    const Vec3 down = forward.cross(right);
+    const float half = std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+    const float pixel = 2.0f * half / static_cast<float>(camera.height);
+    Eigen::Matrix3f rays;
+    rays.col(0) = pixel * right;
+    rays.col(1) = pixel * down;
+    rays.col(2) = forward + (shift.x() - 0.5f * static_cast<float>(camera.width)) * pixel * right
+                  + (shift.y() - 0.5f * static_cast<float>(camera.height)) * pixel * down;
+    return rays;
+}
+
+} // namespace
+
+GeometryBuffer::Targets::Targets(const Gl& gl, int w, int h)
+    : width(w), height(h), position(make_texture(gl, float4_texels, w, h)),
+      normal(make_texture(gl, float4_texels, w, h)),
+      reflectance(make_texture(gl, half4_texels, w, h)),
+      surface(make_texture(gl, index_texels, w, h)), depth(make_texture(gl, depth_texels, w, h)),
+      framebuffer(make_framebuffer(gl, {position, normal, reflectance, surface}, depth)) {}
+
+GeometryBuffer::GeometryBuffer(const Gl& gl)
+    : gl_(gl), program_(gl, "geometry", vertex_shader, fragment_shader, {"position", "normal", "uv"},
+                        {"out_position", "out_normal", "out_reflectance", "out_surface"}) {}
+
+void GeometryBuffer::draw(const SceneMesh& mesh, const Camera& camera, const Vec2& place) {
+    if (!targets_ || targets_->width != camera.width || targets_->height != camera.height)
+        targets_.emplace(gl_, camera.width, camera.height);
+    camera_ = camera;
+    const bool reversed = gl_.ClipControl != nullptr;
+    ViewTransform view = view_transform(camera, mesh.farthest(camera.position), reversed);
+    // Pixel centres come to show what lies at `place`.
+    const Vec2 shift = place - Vec2(0.5f, 0.5f);
+    view.projection.row(0) -= 2.0f * shift.x() / static_cast<float>(camera.width) * view.projection.row(3);
+    view.projection.row(1) -= 2.0f * shift.y() / static_cast<float>(camera.height) * view.projection.row(3);
+
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, targets_->framebuffer);
+    gl_.Viewport(0, 0, camera.width, camera.height);
+    if (reversed) gl_.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    gl_.Enable(GL_DEPTH_TEST);
+    gl_.DepthMask(GL_TRUE);
+    gl_.DepthFunc(reversed ? GL_GREATER : GL_LESS);
+    const std::array<float, 4> nothing = {0.0f, 0.0f, 0.0f, 0.0f};
+    const std::array<GLuint, 4> no_surface = {no_index, 0, 0, 0};
+    const float farthest = reversed ? 0.0f : 1.0f;
+    for (int target = 0; target < 3; ++target) gl_.ClearBufferfv(GL_COLOR, target, nothing.data());
+    gl_.ClearBufferuiv(GL_COLOR, 3, no_surface.data());
+    gl_.ClearBufferfv(GL_DEPTH, 0, &farthest);
+
+    program_.use();
+    program_.set("projection", view.projection);
+    program_.set("eye", view.eye);
+    program_.set("ray", pixel_rays(camera, shift));
+    mesh.draw(program_, view, true);
+    gl_.Disable(GL_DEPTH_TEST);
+    if (reversed) gl_.ClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+}
+
+const PixelSurfaces& GeometryBuffer::read() {
+    const auto size = static_cast<std::size_t>(targets_->width) * static_cast<std::size_t>(targets_->height);
+    positions_.resize(size);
+    normals_.resize(size);
+    surfaces_.resize(size);
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, targets_->framebuffer);
+    gl_.PixelStorei(GL_PACK_ALIGNMENT, 1);
+    const auto read_target = [&](GLenum target, const TexelFormat& format, void* to) {
+        gl_.ReadBuffer(target);
+        gl_.ReadPixels(0, 0, targets_->width, targets_->height, format.format, format.type, to);
+    };
+    read_target(GL_COLOR_ATTACHMENT0, float4_texels, positions_.data());
+    read_target(GL_COLOR_ATTACHMENT1, float4_texels, normals_.data());
+    read_target(GL_COLOR_ATTACHMENT3, index_texels, surfaces_.data());
+    const float half = std::tan(camera_.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+    pixels_ = {targets_->width,  targets_->height, camera_.position,
+               2.0f * half / static_cast<float>(targets_->height), positions_, normals_, surfaces_};
+    return pixels_;
+}
+
+} // namespace afterglow
