@@ -10,9 +10,12 @@ namespace {
 
 constexpr int most_channels = 9;
 
-/// values_i += sign * sum_k weight_ik values_k for the points of one level.
-void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int channels, float sign,
+/// values_i += sign * sum_k weight_ik values_k for the points of one level. `fixed`: the number of
+/// channels where it is known when this is compiled, which makes it twice as fast; else 0.
+template <int fixed>
+void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int any_channels, float sign,
                   std::span<float> values) {
+    const int channels = fixed > 0 ? fixed : any_channels;
     parallel_for(
         end - begin,
         [&](Index k) {
@@ -28,6 +31,16 @@ void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int cha
             for (int c = 0; c < channels; ++c) to[c] += sign * sum[c];
         },
         1024);
+}
+
+void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int channels, float sign,
+                  std::span<float> values) {
+    if (channels == 9)
+        add_weighted<9>(rows, begin, end, channels, sign, values);
+    else if (channels == 3)
+        add_weighted<3>(rows, begin, end, channels, sign, values);
+    else
+        add_weighted<0>(rows, begin, end, channels, sign, values);
 }
 
 } // namespace

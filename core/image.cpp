@@ -88,11 +88,12 @@ unsigned char srgb_byte(float linear) {
     return static_cast<unsigned char>(std::lround(255.0f * s));
 }
 
-std::string encode_png(const Image& image, float key) {
-    const ToneMap tone_map(image, key);
+std::string encode_png(const Image& image, std::optional<float> key) {
+    const std::optional<ToneMap> tone_map = key ? std::optional(ToneMap(image, *key)) : std::nullopt;
     std::vector<unsigned char> bytes(3 * pixel_count(image));
     for (std::size_t i = 0; i < pixel_count(image); ++i) {
-        const Rgb mapped = tone_map(Rgb::Map(&image.rgb[3 * i]));
+        const Rgb linear = Rgb::Map(&image.rgb[3 * i]);
+        const Rgb mapped = tone_map ? (*tone_map)(linear) : linear;
         for (int c = 0; c < 3; ++c)
             bytes[3 * i + c] = srgb_byte(mapped[c]);
     }
@@ -110,7 +111,8 @@ std::string encode_png(const Image& image, float key) {
 
 } // namespace
 
-void write_image(const std::string& path, const Image& image, PixelType type, float exposure) {
+void write_image(const std::string& path, const Image& image, PixelType type,
+                 std::optional<float> exposure) {
     assert(image.width > 0 && image.height > 0 && image.rgb.size() == 3 * pixel_count(image));
     std::string encoded;
     try {

@@ -3,6 +3,7 @@
 #include "core/types.h"
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,9 +26,11 @@ struct Image {
 enum class PixelType { half_float, full_float };
 
 /// Writes by the extension: .exr (linear, channels R, G, B, string attributes) or .png (tone mapped:
-/// Reinhard et al. 2002, global operator at the given exposure key, then sRGB). The file appears
-/// whole or not at all. Throws FileError; UsageError for another extension.
-void write_image(const std::string& path, const Image& image, PixelType type, float exposure = 0.18f);
+/// Reinhard et al. 2002, global operator at the given exposure key, then sRGB; without a key, values
+/// from 0 to 1 are shown as they are). The file appears whole or not at all. Throws FileError;
+/// UsageError for another extension.
+void write_image(const std::string& path, const Image& image, PixelType type,
+                 std::optional<float> exposure = 0.18f);
 
 /// Reads channels R, G, B of an OpenEXR file. Throws FileError.
 Image read_exr(const std::string& path);

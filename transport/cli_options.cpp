@@ -113,10 +113,15 @@ void add_camera_options(CLI::App& command, Camera& camera) {
             "Vertical field of view in degrees (default 50)")
         ->type_name("deg")
         ->group("Camera");
+    add_size_option(command, camera);
+}
+
+void add_size_option(CLI::App& command, Camera& camera) {
     command
         .add_option_function<std::string>(
             "--size", [&camera](const std::string& text) { parse_size(text, camera); },
-            "Size of the picture in pixels (default 640x360)")
+            "Size of the picture in pixels (default " + std::to_string(camera.width) + "x"
+                + std::to_string(camera.height) + ")")
         ->type_name("WxH")
         ->group("Camera");
 }

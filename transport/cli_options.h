@@ -27,6 +27,8 @@ void add_light_options(CLI::App& command, Spotlight& light);
 /// --camera-position, --camera-target, --camera-up, --camera-fov, --size. The caller sees by
 /// camera_was_given() whether the first two are there and runs camera.check().
 void add_camera_options(CLI::App& command, Camera& camera);
+/// --size alone.
+void add_size_option(CLI::App& command, Camera& camera);
 bool camera_was_given(const CLI::App& command);
 
 /// --threads, --quiet, and --seed for what draws random numbers.

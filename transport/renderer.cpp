@@ -3,22 +3,11 @@
 #include "core/parallel.h"
 #include "core/sampling.h"
 
-#include <vector>
 
 namespace afterglow {
 namespace {
 
 constexpr Index pixels_at_once = 64;
-
-/// Places in the pixel [0, 1)^2: each of `samples` columns and rows of equal width holds one where
-/// their number is a power of two. A pattern that changed from pixel to pixel would fray edges.
-std::vector<Vec2> pixel_pattern(int samples) {
-    if (samples == 1) return {Vec2(0.5f, 0.5f)};
-    std::vector<Vec2> pattern;
-    for (int k = 0; k < samples; ++k)
-        pattern.push_back(scrambled_sobol2(static_cast<std::uint32_t>(k), 1));
-    return pattern;
-}
 
 /// What one sample of a pixel adds, and whether the display had something to say there.
 struct Shader {
@@ -40,6 +29,14 @@ struct Shader {
 };
 
 } // namespace
+
+std::vector<Vec2> pixel_pattern(int samples) {
+    if (samples == 1) return {Vec2(0.5f, 0.5f)};
+    std::vector<Vec2> pattern;
+    for (int k = 0; k < samples; ++k)
+        pattern.push_back(scrambled_sobol2(static_cast<std::uint32_t>(k), 1));
+    return pattern;
+}
 
 RenderedPicture render_picture(const Surface& surface, const Display& display,
                                const VectorIrradiance& field, const Spotlight& light,

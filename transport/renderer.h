@@ -8,6 +8,7 @@
 #include "transport/spotlight.h"
 
 #include <cstdint>
+#include <vector>
 
 namespace afterglow {
 
@@ -23,5 +24,10 @@ struct RenderedPicture {
 RenderedPicture render_picture(const Surface& surface, const Display& display,
                                const VectorIrradiance& field, const Spotlight& light,
                                const Camera& camera, Layer layer, int samples);
+
+/// Where in each pixel [0, 1)^2 the samples of render_picture lie, the same in each: a pattern that
+/// changed from pixel to pixel would fray edges. Each of `samples` columns and rows of equal width
+/// holds one where their number is a power of two; one alone lies in the middle.
+std::vector<Vec2> pixel_pattern(int samples);
 
 } // namespace afterglow

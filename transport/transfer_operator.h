@@ -73,6 +73,10 @@ public:
     /// coarser ones pulled from these.
     Radiosity direct_radiosity(const Spotlight& light) const;
 
+    /// What links are multiplied with: the senders' radiosity pulled, differenced and updated, four
+    /// floats a sender (R, G, B, 0).
+    std::vector<float> coefficients(const Radiosity& radiosity) const;
+
     /// One bounce: radiosity of the sender points by light that left them, M f = rho n . push(T e)
     /// with e the coefficients of f.
     Radiosity bounce(const Radiosity& radiosity) const;
@@ -97,8 +101,6 @@ private:
     const TransferOperator& transfer_;
     const Surface& surface_;
     std::optional<DirectLight> direct_light_; // neumann
-    /// Pulled, differenced and updated, four floats a sender (the last zero).
-    std::vector<float> coefficients(const Radiosity& radiosity) const;
     VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
     VectorIrradiance apply_paper(const std::vector<float>& direct_irradiance) const;
 };

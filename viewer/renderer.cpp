@@ -1,9 +1,11 @@
 #include "viewer/renderer.h"
 
 #include "core/error.h"
+#include "transport/renderer.h"
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <string>
 
 namespace afterglow {
@@ -19,6 +21,16 @@ bool shadows_alike(const Spotlight& a, const Spotlight& b) {
 }
 
 } // namespace
+
+FrameTimings& FrameTimings::operator+=(const FrameTimings& more) {
+    geometry += more.geometry;
+    shadow_map += more.shadow_map;
+    direct += more.direct;
+    patches += more.patches;
+    indirect += more.indirect;
+    composition += more.composition;
+    return *this;
+}
 
 const char* indirect_method_name(IndirectMethod method) {
     switch (method) {
@@ -61,9 +73,23 @@ void Renderer::set_method(IndirectMethod method) {
     indirect_is_old_ = true;
 }
 
-void Renderer::draw(const Camera& camera, ViewLayer layer, std::size_t most_new) {
+Image Renderer::average(const Camera& camera, ViewLayer layer, int samples) {
+    Image mean(camera.width, camera.height);
+    FrameTimings all;
+    for (const Vec2& place : pixel_pattern(samples)) {
+        draw(camera, layer, DisplayPatches::no_limit, place);
+        all += timings_;
+        const Image one = read();
+        std::transform(one.rgb.begin(), one.rgb.end(), mean.rgb.begin(), mean.rgb.begin(), std::plus<>());
+    }
+    for (float& value : mean.rgb) value /= static_cast<float>(samples);
+    timings_ = all;
+    return mean;
+}
+
+void Renderer::draw(const Camera& camera, ViewLayer layer, std::size_t most_new, const Vec2& place) {
     timings_ = {};
-    if (!camera_ || !same_view(camera, *camera_)) draw_geometry(camera);
+    if (!camera_ || !same_view(camera, *camera_) || place != place_) draw_geometry(camera, place);
     const bool wants_direct = layer == ViewLayer::full || layer == ViewLayer::direct;
     const bool wants_indirect = is_light(layer) && layer != ViewLayer::direct;
     if (field_ && wants_direct) draw_direct();
@@ -76,8 +102,8 @@ void Renderer::draw(const Camera& camera, ViewLayer layer, std::size_t most_new)
     });
 }
 
-void Renderer::draw_geometry(const Camera& camera) {
-    timings_.geometry = measured([&] { geometry_.draw(mesh_, camera); });
+void Renderer::draw_geometry(const Camera& camera, const Vec2& place) {
+    timings_.geometry = measured([&] { geometry_.draw(mesh_, camera, place); });
     if (!targets_ || targets_->width != camera.width || targets_->height != camera.height) {
         const auto texture = [&] { return make_texture(gl_, float4_texels, camera.width, camera.height); };
         targets_.emplace(Targets{camera.width, camera.height, texture(), {}, texture(), {}});
@@ -85,6 +111,7 @@ void Renderer::draw_geometry(const Camera& camera) {
         targets_->indirect_framebuffer = make_framebuffer(gl_, {targets_->indirect});
     }
     camera_ = camera;
+    place_ = place;
     pixels_ = nullptr;
     direct_is_old_ = indirect_is_old_ = true;
 }

@@ -28,6 +28,7 @@ struct FrameTimings {
     double total() const {
         return geometry + shadow_map + direct + patches + indirect + composition;
     }
+    FrameTimings& operator+=(const FrameTimings& more);
 };
 
 /// Pictures of a transfer scene by deferred shading, on whatever OpenGL there is. Of each stage only
@@ -42,8 +43,12 @@ public:
     void set_method(IndirectMethod method);
     IndirectMethod method() const { return method_; } // automatic until it was measured
 
-    /// Draws a layer. Patches at most `most_new`, see DisplayPatches::find.
-    void draw(const Camera& camera, ViewLayer layer, std::size_t most_new = DisplayPatches::no_limit);
+    /// Draws a layer as it is at one place of each pixel, (0, 0) the top left. Patches at most
+    /// `most_new`, see DisplayPatches::find.
+    void draw(const Camera& camera, ViewLayer layer, std::size_t most_new = DisplayPatches::no_limit,
+              const Vec2& place = {0.5f, 0.5f});
+    /// The mean over `samples` places, those of render_picture(), in linear light.
+    Image average(const Camera& camera, ViewLayer layer, int samples);
     /// How many patches of the last picture are still to come: it gets better when it is drawn again.
     std::size_t patches_missing() const { return patches_missing_; }
     /// Pixels of the last picture with a surface that no function covers.
@@ -73,6 +78,7 @@ private:
 
     std::optional<Targets> targets_;
     std::optional<Camera> camera_; // of what is in the geometry buffer
+    Vec2 place_ = Vec2::Zero();
     Spotlight light_;
     std::optional<DisplayField> field_;
     bool shadow_map_is_old_ = true, direct_is_old_ = true, indirect_is_old_ = true;
@@ -83,7 +89,7 @@ private:
     std::vector<PixelSurfaces::Float4> gathered_;
     FrameTimings timings_;
 
-    void draw_geometry(const Camera& camera);
+    void draw_geometry(const Camera& camera, const Vec2& place);
     void draw_direct();
     void find_patches(std::size_t most_new);
     void draw_indirect();

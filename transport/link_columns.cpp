@@ -1,0 +1,90 @@
+#include "transport/link_columns.h"
+
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+// An entry: the receiver within its block, 13 bits, then from bit 13 on what bits 7 to 23 of a
+// PackedLink are: exponent, x, y and z.
+static_assert(LinkColumns::block_size == 1 << 13);
+
+std::uint32_t pack(Index receiver, std::uint32_t bits) {
+    return static_cast<std::uint32_t>(receiver) | (bits >> 7) << 13;
+}
+Index receiver_of(std::uint32_t entry) { return entry & 8191u; }
+LinkVector vector_of(std::uint32_t entry) { return Links::vector_of((entry >> 13) << 7); }
+
+} // namespace
+
+LinkColumns::LinkColumns(const Links& links, Index senders)
+    : receivers_(links.rows()), senders_(senders),
+      begin_(static_cast<std::size_t>(blocks() * (senders + 1))),
+      count_(static_cast<std::size_t>(senders)) {
+    const auto for_each_of_block = [&](Index block, const auto& visit) {
+        const Index first = block * block_size;
+        for (Index i = first; i < std::min(receivers_, first + block_size); ++i) {
+            std::uint32_t sender = ~0u;
+            for (const PackedLink& packed : links.row(i)) {
+                const std::uint32_t bits = Links::bits_of(packed);
+                sender += Links::step_of(bits);
+                if (!Links::is_jump(bits)) visit(sender, pack(i - first, bits));
+            }
+        }
+    };
+    // How many of each sender, then where they begin, then the entries themselves.
+    const auto per_block = static_cast<std::size_t>(senders + 1);
+    parallel_for(blocks(), [&](Index block) {
+        std::uint64_t* count = &begin_[static_cast<std::size_t>(block) * per_block];
+        for_each_of_block(block, [&](std::uint32_t sender, std::uint32_t) { ++count[sender]; });
+    }, 1);
+    std::uint64_t total = 0;
+    for (std::size_t k = 0; k < begin_.size(); ++k) {
+        const std::uint64_t here = begin_[k];
+        if (k % per_block < per_block - 1) count_[k % per_block] += static_cast<std::uint32_t>(here);
+        begin_[k] = total;
+        total += here;
+    }
+    entry_.resize(total);
+    parallel_for(blocks(), [&](Index block) {
+        const auto first = begin_.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(block) * per_block);
+        std::vector<std::uint64_t> next(first, first + static_cast<std::ptrdiff_t>(per_block));
+        for_each_of_block(block, [&](std::uint32_t sender, std::uint32_t entry) {
+            entry_[next[sender]++] = entry;
+        });
+    }, 1);
+}
+
+void LinkColumns::add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {
+    parallel_for(blocks(), [&](Index block) {
+        Eigen::Vector4f* const first = &to[static_cast<std::size_t>(3 * block * block_size)];
+        for (const Change& change : changes) {
+            const Eigen::Vector4f c = change.coefficients;
+            for (const std::uint32_t entry : segment(block, change.sender)) {
+                const LinkVector link = vector_of(entry);
+                Eigen::Vector4f* const f = first + 3 * receiver_of(entry);
+                f[0] += link.x() * c;
+                f[1] += link.y() * c;
+                f[2] += link.z() * c;
+            }
+        }
+    }, 1);
+}
+
+std::vector<float> LinkColumns::norms(std::span<const float> weights) const {
+    std::vector<float> norms(static_cast<std::size_t>(senders_));
+    parallel_for(senders_, [&](Index sender) {
+        double sum = 0.0;
+        for (Index block = 0; block < blocks(); ++block)
+            for (const std::uint32_t entry : segment(block, sender))
+                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size + receiver_of(entry))])
+                       * vector_of(entry).squaredNorm();
+        norms[static_cast<std::size_t>(sender)] = static_cast<float>(std::sqrt(sum));
+    });
+    return norms;
+}
+
+} // namespace afterglow

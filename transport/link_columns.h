@@ -1,0 +1,53 @@
+#pragma once
+
+#include "transport/packed_links.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace afterglow {
+
+/// The links sorted by sender: for products with vectors of which few entries are not zero. Receivers
+/// come in blocks, whose results stay in a core's cache; within a block links are sorted by sender.
+/// Four bytes a link, and eight a block and sender.
+class LinkColumns {
+public:
+    static constexpr Index block_size = 8192; // receivers
+
+    /// Copies `links`, of so many senders.
+    LinkColumns(const Links& links, Index senders);
+
+    Index receivers() const { return receivers_; }
+    Index senders() const { return senders_; }
+    std::uint64_t links() const { return entry_.size(); }
+    std::uint32_t links_of(Index sender) const { return count_[static_cast<std::size_t>(sender)]; }
+    std::size_t bytes() const {
+        return sizeof(std::uint32_t) * (entry_.size() + count_.size())
+               + sizeof(std::uint64_t) * begin_.size();
+    }
+
+    /// By how much the coefficients of a sender change.
+    struct Change {
+        std::uint32_t sender;
+        Eigen::Vector4f coefficients; // R, G, B, 0
+    };
+    /// to[3 i + a] += sum of link_ij[a] * change_j over the changes j, for all receivers i and axes a.
+    /// Changes must rise by sender. The same bits at any number of threads.
+    void add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
+    /// Square root of sum_i weight_i |link_ij|^2 of each sender; a weight a receiver.
+    std::vector<float> norms(std::span<const float> weights) const;
+
+private:
+    Index receivers_, senders_;
+    std::vector<std::uint64_t> begin_; // of block b and sender j: b * (senders + 1) + j
+    std::vector<std::uint32_t> entry_; // see pack()
+    std::vector<std::uint32_t> count_; // a sender
+    Index blocks() const { return (receivers_ + block_size - 1) / block_size; }
+    std::span<const std::uint32_t> segment(Index block, Index sender) const {
+        const auto at = static_cast<std::size_t>(block * (senders_ + 1) + sender);
+        return {entry_.data() + begin_[at], entry_.data() + begin_[at + 1]};
+    }
+};
+
+} // namespace afterglow

@@ -1,0 +1,77 @@
+#pragma once
+
+#include "transport/link_columns.h"
+#include "transport/transfer_operator.h"
+
+#include <optional>
+#include <vector>
+
+namespace afterglow {
+
+struct MovingLightStatistics {
+    double direct_seconds = 0.0, coefficients_seconds = 0.0, links_seconds = 0.0, push_seconds = 0.0;
+    int rounds = 0;
+    double links_share = 0.0; // links that were multiplied, of all; of all rounds together
+    bool anew = false;        // the light had jumped: all was computed from the start
+    bool settled = false;     // a further round would change less than the tolerance
+    double seconds() const {
+        return direct_seconds + coefficients_seconds + links_seconds + push_seconds;
+    }
+};
+
+/// Indirect light that follows a light which moves: LightTransport::indirect at a fraction of its cost
+/// where two poses differ little.
+///
+/// With e the direct radiosity, M the bounce and T the links, it keeps the coefficients c of the radiosity
+/// b = e + M b and the product T c. A *round* computes b anew from the product as it is, and its
+/// coefficients; then those that have changed most since they were last multiplied are multiplied, by
+/// their columns of T, and the product is corrected. So the light of further bounces is at most a few
+/// poses old, and comes to rest with the light: rounds are the Neumann series, from the last pose on.
+///
+/// A column waits while |change of c_j| |T_j| < tau sqrt(links of j), tau = 0.7 tolerance |T c| /
+/// sqrt(all links), so that all that wait together change the field's root mean square by less than 0.7
+/// `tolerance` of it. The light has settled when all changes together are below the tolerance.
+class MovingLight {
+public:
+    struct Options {
+        double tolerance = 2e-3;
+        int most_rounds = 0; // a pose; 0: until it has settled
+    };
+
+    /// Keeps a reference. Copies the links: 4 bytes each.
+    MovingLight(const LightTransport& transport, const Options& options);
+
+    /// Indirect vector irradiance at all points under the light, until the next call. The same poses in
+    /// the same order give the same bits at any number of threads. Of operators without further
+    /// columns (the paper's, or with a given number of bounces) it is LightTransport::indirect.
+    const VectorIrradiance& follow(const Spotlight& light, MovingLightStatistics* statistics = nullptr);
+
+    std::size_t bytes() const { return columns_ ? columns_->bytes() : 0; }
+
+private:
+    const LightTransport& transport_;
+    Options options_;
+    std::optional<LinkColumns> columns_;
+    std::vector<float> norm_;                // |T_j|, as it counts at the display level
+    std::vector<float> applied_;             // c as it was multiplied, four floats a sender
+    std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each
+    VectorIrradiance field_;
+    double field_norm_ = 0.0; // |field| at the display level
+    std::optional<Spotlight> light_; // of the last pose
+
+    Radiosity radiosity(const Radiosity& direct);
+    struct Changes {
+        std::vector<LinkColumns::Change> list; // those that cannot wait
+        std::uint64_t links = 0;               // of these
+        double effect = 0.0;                   // of all changes on the field, root of the sum of squares
+    };
+    Changes changes(const std::vector<float>& coefficients) const;
+    void start_anew(const Radiosity& direct);
+    /// Of a light that changes its intensity alone, all is known.
+    void follow_intensity(const Spotlight& light);
+    void follow_brightness(const std::vector<float>& coefficients);
+    void scale(const Rgb& factor);
+    void push_field(int levels);
+};
+
+} // namespace afterglow

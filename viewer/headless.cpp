@@ -1,0 +1,92 @@
+#include "viewer/headless.h"
+
+#include "core/error.h"
+#include "core/file.h"
+#include "viewer/frame_path.h"
+#include "viewer/gl_context.h"
+
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <span>
+
+namespace afterglow {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+bool same_light(const Spotlight& a, const Spotlight& b) {
+    return a.position == b.position && a.direction == b.direction && a.inner_angle == b.inner_angle
+           && a.outer_angle == b.outer_angle && (a.intensity == b.intensity).all();
+}
+
+Json milliseconds(const FrameTimings& t) {
+    return {{"geometry", 1e3 * t.geometry}, {"shadow_map", 1e3 * t.shadow_map},
+            {"direct", 1e3 * t.direct},     {"patches", 1e3 * t.patches},
+            {"indirect", 1e3 * t.indirect}, {"composition", 1e3 * t.composition},
+            {"picture", 1e3 * t.total()}};
+}
+
+std::string frame_name(std::size_t k, const std::string& format) {
+    std::array<char, 32> name{};
+    std::snprintf(name.data(), name.size(), "frame_%04zu.", k);
+    return name.data() + format;
+}
+
+} // namespace
+
+void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
+    std::vector<Frame> frames = read_frame_path(options.frames);
+    std::error_code failure;
+    std::filesystem::create_directories(options.folder, failure);
+    if (failure) throw FileError(options.folder, "cannot be made: " + failure.message());
+
+    const std::unique_ptr<GlContext> context = make_offscreen_context(options.context);
+    Renderer renderer(context->gl(), scene, options.method);
+    DisplayField field(scene.file.transfer.points);
+    Json timings = Json::array();
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+        Frame& frame = frames[k];
+        frame.camera.width = options.width;
+        frame.camera.height = options.height;
+        frame.camera.check();
+        double light_seconds = 0.0;
+        if (k == 0 || !same_light(frame.light, frames[k - 1].light)) {
+            const auto start = std::chrono::steady_clock::now();
+            field.set(scene.transport.indirect(frame.light));
+            light_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            renderer.set_light(frame.light, field);
+        }
+        const Image picture = renderer.average(frame.camera, options.layer, options.samples);
+        const std::string name = frame_name(k, options.format);
+        write_image((std::filesystem::path(options.folder) / name).string(), picture,
+                    PixelType::half_float,
+                    is_light(options.layer) ? std::optional(options.exposure) : std::nullopt);
+        Json entry = {{"frame", name}, {"time", frame.time}, {"light", 1e3 * light_seconds}};
+        entry.update(milliseconds(renderer.timings()));
+        entry["uncovered_pixels"] = renderer.uncovered_pixels();
+        timings.push_back(entry);
+    }
+    const std::vector<std::string>& errors = context->gl().errors();
+    if (!errors.empty()) throw Error("OpenGL: " + errors.front());
+
+    const Json report = {{"version", AFTERGLOW_VERSION},
+                         {"opengl", context->gl().renderer()},
+                         {"indirect", indirect_method_name(renderer.method())},
+                         {"layer", view_layer_name(options.layer)},
+                         {"width", options.width},
+                         {"height", options.height},
+                         {"samples", options.samples},
+                         {"unit", "ms"},
+                         {"frames", timings}};
+    const std::string text = report.dump(1) + "\n";
+    write_atomically((std::filesystem::path(options.folder) / "timings.json").string(),
+                     [&](const std::string& temporary) {
+                         write_bytes(temporary, std::as_bytes(std::span(text)));
+                     });
+}
+
+} // namespace afterglow

@@ -1,0 +1,88 @@
+#include "core/error.h"
+#include "core/parallel.h"
+#include "transport/cli_options.h"
+#include "viewer/headless.h"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <exception>
+
+namespace {
+
+using namespace afterglow;
+
+struct ViewCommand {
+    std::string file, scene, layer = "full", method = "auto";
+    bool headless = false;
+    double exposure = 0.18;
+    Camera size = {.width = 1280, .height = 720}; // of the picture alone
+    HeadlessOptions frames;
+    int threads = 0;
+};
+
+void add_options(CLI::App& app, ViewCommand& command) {
+    app.add_option("file", command.file, "Transfer file")->required();
+    app.add_option("--scene", command.scene, "Where the scene is now");
+    app.add_flag("--headless", command.headless, "No window: draw the frames of a path");
+    app.add_option("--frames", command.frames.frames, "Path of camera and light (.json)");
+    app.add_option("-o,--output", command.frames.folder, "Folder of the frames and timings.json");
+    app.add_option("--format", command.frames.format, "Of the frames: png or exr (default png)")
+        ->check(CLI::IsMember({"png", "exr"}));
+    app.add_option("--samples", command.frames.samples, "Samples a pixel of the frames (default 4)")
+        ->check(CLI::Range(1, 4096));
+    app.add_option("--context", command.frames.context,
+                   "OpenGL's: auto, glfw (a window), egl or osmesa (default auto)")
+        ->check(CLI::IsMember({"auto", "glfw", "egl", "osmesa"}));
+    app.add_option("--indirect", command.method,
+                   "How indirect light is drawn: splat, gather or auto, the faster (default auto)");
+    app.add_option("--layer", command.layer,
+                   "full, direct, indirect, irradiance, reflectance or normals (default full)");
+    add_size_option(app, command.size);
+    add_number(app, "--exposure", command.exposure, "Key of the tone map (default 0.18)");
+    app.add_option("--threads", command.threads, "Threads to use (default 0: all processors)")
+        ->check(CLI::Range(0, 4096));
+}
+
+void run(ViewCommand& command) {
+    if (!(command.exposure > 0.0)) throw UsageError("--exposure must be positive");
+    HeadlessOptions& frames = command.frames;
+    frames.layer = view_layer_from_name(command.layer);
+    frames.method = indirect_method_from_name(command.method);
+    frames.exposure = static_cast<float>(command.exposure);
+    frames.width = command.size.width;
+    frames.height = command.size.height;
+    if (!command.headless) throw UsageError("there is no window yet; give --headless");
+    if (frames.frames.empty() || frames.folder.empty())
+        throw UsageError("--headless needs --frames PATH.json and -o FOLDER");
+    if (frames.context == "glfw") throw UsageError("--headless has no window: --context egl or osmesa");
+    const ThreadLimit limit(command.threads);
+    const TransferScene scene(command.file, command.scene);
+    draw_frames(scene, frames);
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Interactive indirect light from a transfer file", "afterglow-view");
+    app.set_version_flag("--version", AFTERGLOW_VERSION);
+    ViewCommand command;
+    add_options(app, command);
+    const auto fail = [](const std::exception& error, int status, const char* remedy = "") {
+        std::fprintf(stderr, "afterglow-view: %s%s\n", error.what(), remedy);
+        return status;
+    };
+    try {
+        app.parse(argc, argv);
+        run(command);
+        return 0;
+    } catch (const CLI::Success& help) {
+        return app.exit(help);
+    } catch (const CLI::ParseError& error) {
+        return fail(error, 2, "; see --help");
+    } catch (const UsageError& error) {
+        return fail(error, 2);
+    } catch (const std::exception& error) {
+        return fail(error, 1);
+    }
+}
