@@ -93,11 +93,14 @@ void DisplayPatches::WantedLists::append(const WantedLists& more) {
     large.insert(large.end(), more.large.begin(), more.large.end());
     untested.insert(untested.end(), more.untested.begin(), more.untested.end());
     small.insert(small.end(), more.small.begin(), more.small.end());
+    small_pixels += more.small_pixels;
 }
 
 DisplayPatches::WantedLists DisplayPatches::look(const PixelSurfaces& pixels,
                                                  std::span<const std::uint32_t> which,
+                                                 double small_share,
                                                  std::span<std::uint32_t> patch) const {
+    const auto largest = static_cast<std::uint32_t>(small_share * 0xffffffffu);
     const auto count = static_cast<Index>(which.size());
     std::vector<WantedLists> wanted(
         static_cast<std::size_t>((count + pixels_at_once - 1) / pixels_at_once));
@@ -123,9 +126,12 @@ DisplayPatches::WantedLists DisplayPatches::look(const PixelSurfaces& pixels,
             } else if (state_[found] == State::delicate) {
                 const Cell small = cell(pixels, p, options_.small_pixels);
                 const std::uint64_t small_key = small.key();
-                if (const std::uint32_t s = look_up(small_key); s != no_index)
+                if (const std::uint32_t s = look_up(small_key); s != no_index) {
                     patch[p] = s;
-                else
+                    continue;
+                }
+                ++here.small_pixels;
+                if (static_cast<std::uint32_t>(hash64(small_key)) <= largest)
                     here.small.push_back({small_key, p, small.size_exponent});
             }
         }
@@ -167,7 +173,9 @@ std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_n
             for (const Wanted& w : g) list.push_back(w.pixel);
         return list;
     };
-    WantedLists wanted = look(pixels, which, patch);
+    const double small_share =
+        std::min(1.0, 2.0 * static_cast<double>(most_new) / static_cast<double>(std::max<std::size_t>(1, waiting_)));
+    WantedLists wanted = look(pixels, which, small_share, patch);
 
     std::vector<Group> large = group(wanted.large);
     large = chosen(large, large.size());
@@ -176,13 +184,13 @@ std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_n
         return find(pixels, most_new, patch);
     }
     make(pixels, large, State::untested);
-    wanted.append(look(pixels, pixels_of(large), patch));
+    wanted.append(look(pixels, pixels_of(large), small_share, patch));
 
     const std::vector<Group> untested = group(wanted.untested);
     const std::size_t tested = std::min(untested.size(), most_new / places_compared);
     const std::vector<Group> to_test = chosen(untested, tested);
     test(pixels, to_test);
-    wanted.append(look(pixels, pixels_of(to_test), patch));
+    wanted.append(look(pixels, pixels_of(to_test), small_share, patch));
 
     const std::vector<Group> small = group(wanted.small);
     const std::size_t room =
@@ -190,8 +198,10 @@ std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_n
     const std::size_t made = std::min({small.size(), most_new - tested * places_compared, room});
     const std::vector<Group> to_make = chosen(small, made);
     make(pixels, to_make, State::plain);
-    look(pixels, pixels_of(to_make), patch);
-    return untested.size() - tested + small.size() - made;
+    const std::vector<std::uint32_t> done = pixels_of(to_make);
+    waiting_ = wanted.small_pixels - done.size() + look(pixels, done, 0.0, patch).small_pixels;
+    for (const Group& g : std::span(untested).subspan(tested)) waiting_ += g.size();
+    return waiting_;
 }
 
 void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> groups, State state) {

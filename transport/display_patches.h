@@ -51,7 +51,7 @@ public:
 
     /// Writes the patch of each pixel (no_index where there is no surface), and makes those that are
     /// missing, evaluating factors at about `most_new` places beyond one a large patch (5 to 30 us each
-    /// and thread). Returns how many are still missing. The same calls in the same order give the same
+    /// and thread). Returns how many pixels still wait for their right patch. The same calls in the same order give the same
     /// patches at any number of threads.
     std::size_t find(const PixelSurfaces& pixels, std::size_t most_new,
                      std::vector<std::uint32_t>& patch);
@@ -85,6 +85,7 @@ private:
     };
     struct WantedLists {
         std::vector<Wanted> large, untested, small;
+        std::size_t small_pixels = 0; // in the list or not
         void append(const WantedLists& more);
     };
     /// Pixels that want the same patch.
@@ -103,13 +104,15 @@ private:
     std::vector<BasisEntry> entries_;
     std::vector<State> state_; // a patch each
     std::uint64_t generation_ = 0;
+    std::size_t waiting_ = 0; // pixels, after the last find()
 
     Cell cell(const PixelSurfaces& pixels, std::size_t pixel, float size_in_pixels) const;
     std::uint32_t look_up(std::uint64_t key) const;
     void insert(std::uint64_t key, std::uint32_t patch);
-    /// Writes the patches of some pixels as they are now, and says what is wanted for them.
+    /// Writes the patches of some pixels as they are now, and says what is wanted for them; of the small
+    /// patches about the given share, as there may be many more than can be made.
     WantedLists look(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
-                     std::span<std::uint32_t> patch) const;
+                     double small_share, std::span<std::uint32_t> patch) const;
     /// By key, which is as good as at random.
     static std::vector<Group> group(std::vector<Wanted>& wanted);
     /// The first `count`, thus all over the picture, in the order of their pixels, so that what lies

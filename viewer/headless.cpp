@@ -4,11 +4,11 @@
 #include "core/file.h"
 #include "viewer/frame_path.h"
 #include "viewer/gl_context.h"
+#include "viewer/light_solver.h"
 
 #include <nlohmann/json.hpp>
 
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <span>
@@ -30,6 +30,13 @@ Json milliseconds(const FrameTimings& t) {
             {"picture", 1e3 * t.total()}};
 }
 
+Json milliseconds(const MovingLightStatistics& s) {
+    return {{"light_direct", 1e3 * s.direct_seconds}, {"light_coefficients", 1e3 * s.coefficients_seconds},
+            {"light_links", 1e3 * s.links_seconds},   {"light_push", 1e3 * s.push_seconds},
+            {"light", 1e3 * s.seconds()},             {"light_rounds", s.rounds},
+            {"light_links_share", s.links_share}};
+}
+
 std::string frame_name(std::size_t k, const std::string& format) {
     std::array<char, 32> name{};
     std::snprintf(name.data(), name.size(), "frame_%04zu.", k);
@@ -46,26 +53,25 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
 
     const std::unique_ptr<GlContext> context = make_offscreen_context(options.context);
     Renderer renderer(context->gl(), scene, options.method);
-    DisplayField field(scene.file.transfer.points);
+    LightSolver solver(scene, 0);
     Json timings = Json::array();
     for (std::size_t k = 0; k < frames.size(); ++k) {
         Frame& frame = frames[k];
         frame.camera.width = options.width;
         frame.camera.height = options.height;
         frame.camera.check();
-        double light_seconds = 0.0;
+        MovingLightStatistics light;
         if (k == 0 || !same_light(frame.light, frames[k - 1].light)) {
-            const auto start = std::chrono::steady_clock::now();
-            field.set(scene.transport.indirect(frame.light));
-            light_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-            renderer.set_light(frame.light, field);
+            renderer.set_light(frame.light, solver.solve(frame.light));
+            light = solver.statistics();
         }
         const Image picture = renderer.average(frame.camera, options.layer, options.samples);
         const std::string name = frame_name(k, options.format);
         write_image((std::filesystem::path(options.folder) / name).string(), picture,
                     PixelType::half_float,
                     is_light(options.layer) ? std::optional(options.exposure) : std::nullopt);
-        Json entry = {{"frame", name}, {"time", frame.time}, {"light", 1e3 * light_seconds}};
+        Json entry = {{"frame", name}, {"time", frame.time}};
+        entry.update(milliseconds(light));
         entry.update(milliseconds(renderer.timings()));
         entry["uncovered_pixels"] = renderer.uncovered_pixels();
         timings.push_back(entry);

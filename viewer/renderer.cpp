@@ -7,6 +7,7 @@
 #include <chrono>
 #include <functional>
 #include <string>
+#include <utility>
 
 namespace afterglow {
 namespace {
@@ -61,10 +62,10 @@ double Renderer::measured(const Stage& stage) const {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void Renderer::set_light(const Spotlight& light, const DisplayField& field) {
+void Renderer::set_light(const Spotlight& light, std::shared_ptr<const DisplayField> field) {
     if (!field_ || !shadows_alike(light, light_)) shadow_map_is_old_ = true;
     light_ = light;
-    field_ = field;
+    field_ = std::move(field);
     direct_is_old_ = indirect_is_old_ = splatter_is_old_ = true;
 }
 

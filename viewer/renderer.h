@@ -6,6 +6,7 @@
 #include "viewer/shadow_map.h"
 #include "viewer/splatter.h"
 
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -39,7 +40,7 @@ public:
     Renderer(const Gl& gl, const TransferScene& scene, IndirectMethod method);
 
     /// The light, and the indirect light that it makes: they change together.
-    void set_light(const Spotlight& light, const DisplayField& field);
+    void set_light(const Spotlight& light, std::shared_ptr<const DisplayField> field);
     void set_method(IndirectMethod method);
     IndirectMethod method() const { return method_; } // automatic until it was measured
 
@@ -80,7 +81,7 @@ private:
     std::optional<Camera> camera_; // of what is in the geometry buffer
     Vec2 place_ = Vec2::Zero();
     Spotlight light_;
-    std::optional<DisplayField> field_;
+    std::shared_ptr<const DisplayField> field_;
     bool shadow_map_is_old_ = true, direct_is_old_ = true, indirect_is_old_ = true;
     bool splatter_is_old_ = true;
     const PixelSurfaces* pixels_ = nullptr;
