@@ -88,6 +88,17 @@ unsigned char srgb_byte(float linear) {
     return static_cast<unsigned char>(std::lround(255.0f * s));
 }
 
+std::string compress_png(int width, int height, std::span<const unsigned char> rgb) {
+    std::string png;
+    const auto append = [](void* target, void* data, int size) {
+        static_cast<std::string*>(target)->append(static_cast<const char*>(data),
+                                                  static_cast<std::size_t>(size));
+    };
+    if (stbi_write_png_to_func(append, &png, width, height, 3, rgb.data(), 3 * width) == 0)
+        throw Error("not enough memory to compress the picture");
+    return png;
+}
+
 std::string encode_png(const Image& image, std::optional<float> key) {
     const std::optional<ToneMap> tone_map = key ? std::optional(ToneMap(image, *key)) : std::nullopt;
     std::vector<unsigned char> bytes(3 * pixel_count(image));
@@ -97,16 +108,7 @@ std::string encode_png(const Image& image, std::optional<float> key) {
         for (int c = 0; c < 3; ++c)
             bytes[3 * i + c] = srgb_byte(mapped[c]);
     }
-    std::string png;
-    const auto append = [](void* target, void* data, int size) {
-        static_cast<std::string*>(target)->append(static_cast<const char*>(data),
-                                                  static_cast<std::size_t>(size));
-    };
-    const bool done = stbi_write_png_to_func(append, &png, image.width, image.height, 3,
-                                             bytes.data(), 3 * image.width)
-                      != 0;
-    if (!done) throw Error("not enough memory to compress the picture");
-    return png;
+    return compress_png(image.width, image.height, bytes);
 }
 
 } // namespace
@@ -127,6 +129,14 @@ void write_image(const std::string& path, const Image& image, PixelType type,
     } catch (const std::exception& e) {
         throw FileError(path, std::string("cannot be encoded: ") + e.what());
     }
+    write_atomically(path, [&](const std::string& temporary) {
+        write_bytes(temporary, std::as_bytes(std::span(encoded)));
+    });
+}
+
+void write_png_bytes(const std::string& path, int width, int height, std::span<const unsigned char> rgb) {
+    assert(rgb.size() == 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    const std::string encoded = compress_png(width, height, rgb);
     write_atomically(path, [&](const std::string& temporary) {
         write_bytes(temporary, std::as_bytes(std::span(encoded)));
     });

@@ -4,6 +4,7 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ enum class PixelType { half_float, full_float };
 /// UsageError for another extension.
 void write_image(const std::string& path, const Image& image, PixelType type,
                  std::optional<float> exposure = 0.18f);
+
+/// Writes a PNG file of bytes as they are, R, G, B each, rows from the top. Throws FileError.
+void write_png_bytes(const std::string& path, int width, int height, std::span<const unsigned char> rgb);
 
 /// Reads channels R, G, B of an OpenEXR file. Throws FileError.
 Image read_exr(const std::string& path);

@@ -5,13 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
+#include <utility>
 
 namespace afterglow {
 namespace {
 
 constexpr Index pixels_at_once = 4096, patches_at_once = 64;
-constexpr int places_compared = 3; // beside the first
+constexpr int places_compared = 4; // beside the first
 
 /// Sum of |a - b| over two rows by increasing id.
 float row_difference(std::span<const BasisEntry> a, std::span<const BasisEntry> b) {
@@ -85,7 +87,7 @@ void DisplayPatches::forget_all() {
     std::fill(table_.begin(), table_.end(), Slot{});
     begin_.assign(1, 0);
     entries_.clear();
-    state_.clear();
+    patch_.clear();
     ++generation_;
 }
 
@@ -93,7 +95,7 @@ void DisplayPatches::WantedLists::append(const WantedLists& more) {
     large.insert(large.end(), more.large.begin(), more.large.end());
     untested.insert(untested.end(), more.untested.begin(), more.untested.end());
     small.insert(small.end(), more.small.begin(), more.small.end());
-    small_pixels += more.small_pixels;
+    small_pixels.insert(small_pixels.end(), more.small_pixels.begin(), more.small_pixels.end());
 }
 
 DisplayPatches::WantedLists DisplayPatches::look(const PixelSurfaces& pixels,
@@ -121,16 +123,17 @@ DisplayPatches::WantedLists DisplayPatches::look(const PixelSurfaces& pixels,
             patch[p] = found;
             if (found == no_index) {
                 here.large.push_back({key, p, large.size_exponent});
-            } else if (state_[found] == State::untested) {
-                here.untested.push_back({key, p, large.size_exponent});
-            } else if (state_[found] == State::delicate) {
+            } else if (!patch_[found].is_delicate()) {
+                if (patch_[found].distance2(pixels.position[p]) > patch_[found].alike2)
+                    here.untested.push_back({key, p, large.size_exponent});
+            } else {
                 const Cell small = cell(pixels, p, options_.small_pixels);
                 const std::uint64_t small_key = small.key();
                 if (const std::uint32_t s = look_up(small_key); s != no_index) {
                     patch[p] = s;
                     continue;
                 }
-                ++here.small_pixels;
+                here.small_pixels.push_back(p);
                 if (static_cast<std::uint32_t>(hash64(small_key)) <= largest)
                     here.small.push_back({small_key, p, small.size_exponent});
             }
@@ -165,16 +168,28 @@ std::vector<DisplayPatches::Group> DisplayPatches::chosen(std::span<const Group>
 std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_new,
                                  std::vector<std::uint32_t>& patch) {
     patch.resize(pixels.surface.size());
-    std::vector<std::uint32_t> which(patch.size());
-    std::iota(which.begin(), which.end(), 0u);
+    std::vector<std::uint32_t> all(patch.size());
+    std::iota(all.begin(), all.end(), 0u);
+    return serve(pixels, all, most_new, patch);
+}
+
+std::size_t DisplayPatches::refine(const PixelSurfaces& pixels, std::size_t most_new,
+                                   std::vector<std::uint32_t>& patch) {
+    const std::vector<std::uint32_t> waiting = std::move(waiting_);
+    return serve(pixels, waiting, most_new, patch);
+}
+
+std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
+                                  std::size_t most_new, std::vector<std::uint32_t>& patch) {
     const auto pixels_of = [](std::span<const Group> groups) {
         std::vector<std::uint32_t> list;
         for (const Group& g : groups)
             for (const Wanted& w : g) list.push_back(w.pixel);
         return list;
     };
-    const double small_share =
-        std::min(1.0, 2.0 * static_cast<double>(most_new) / static_cast<double>(std::max<std::size_t>(1, waiting_)));
+    // As many small patches are wanted as pixels waited, or fewer: twice what is needed will do.
+    const double small_share = std::min(1.0, 2.0 * static_cast<double>(most_new)
+                                                 / static_cast<double>(std::max<std::size_t>(1, small_waiting_)));
     WantedLists wanted = look(pixels, which, small_share, patch);
 
     std::vector<Group> large = group(wanted.large);
@@ -183,7 +198,7 @@ std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_n
         forget_all();
         return find(pixels, most_new, patch);
     }
-    make(pixels, large, State::untested);
+    make(pixels, large, false);
     wanted.append(look(pixels, pixels_of(large), small_share, patch));
 
     const std::vector<Group> untested = group(wanted.untested);
@@ -197,14 +212,21 @@ std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_n
         std::max(options_.most_patches, 2 * patch.size()) - std::min(patches(), options_.most_patches);
     const std::size_t made = std::min({small.size(), most_new - tested * places_compared, room});
     const std::vector<Group> to_make = chosen(small, made);
-    make(pixels, to_make, State::plain);
+    make(pixels, to_make, true);
     const std::vector<std::uint32_t> done = pixels_of(to_make);
-    waiting_ = wanted.small_pixels - done.size() + look(pixels, done, 0.0, patch).small_pixels;
-    for (const Group& g : std::span(untested).subspan(tested)) waiting_ += g.size();
-    return waiting_;
+    look(pixels, done, 0.0, patch);
+
+    std::vector<bool> is_done(patch.size());
+    for (const std::uint32_t p : done) is_done[p] = true;
+    waiting_ = pixels_of(std::span(untested).subspan(tested));
+    const std::size_t untested_pixels = waiting_.size();
+    std::copy_if(wanted.small_pixels.begin(), wanted.small_pixels.end(), std::back_inserter(waiting_),
+                 [&](std::uint32_t p) { return !is_done[p]; });
+    small_waiting_ = waiting_.size() - untested_pixels;
+    return waiting_.size();
 }
 
-void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> groups, State state) {
+void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> groups, bool are_small) {
     struct Rows {
         std::vector<BasisEntry> entries;
         std::vector<std::size_t> end;
@@ -225,35 +247,35 @@ void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> gr
         const std::size_t first = entries_.size();
         entries_.insert(entries_.end(), rows.entries.begin(), rows.entries.end());
         for (const std::size_t end : rows.end) {
-            insert(groups[next++].front().key, static_cast<std::uint32_t>(patches()));
+            const Wanted& w = groups[next++].front();
+            const PixelSurfaces::Float4& x = pixels.position[w.pixel];
+            insert(w.key, static_cast<std::uint32_t>(patches()));
             begin_.push_back(static_cast<std::uint32_t>(first + end));
-            state_.push_back(state);
+            patch_.push_back({{x[0], x[1], x[2]}, are_small ? std::numeric_limits<float>::infinity() : 0.0f});
         }
     }
 }
 
 void DisplayPatches::test(const PixelSurfaces& pixels, std::span<const Group> groups) {
-    std::vector<State> result(groups.size());
+    std::vector<float> alike2(groups.size());
     parallel_for(static_cast<Index>(groups.size()), [&](Index k) {
-        result[static_cast<std::size_t>(k)] = compared(pixels, groups[static_cast<std::size_t>(k)]);
+        alike2[static_cast<std::size_t>(k)] = compared(pixels, groups[static_cast<std::size_t>(k)]);
     }, patches_at_once);
     for (std::size_t k = 0; k < groups.size(); ++k)
-        state_[look_up(groups[k].front().key)] = result[k];
+        patch_[look_up(groups[k].front().key)].alike2 = alike2[k];
 }
 
-DisplayPatches::State DisplayPatches::compared(const PixelSurfaces& pixels,
-                                               const Group& group) const {
-    const std::span<const BasisEntry> factors = functions(look_up(group.front().key));
-    // How far each pixel is from the closest that was looked at; the first made the patch.
-    std::vector<float> distance2(group.size(), std::numeric_limits<float>::infinity());
-    std::size_t seen = 0;
+float DisplayPatches::compared(const PixelSurfaces& pixels, const Group& group) const {
+    const std::uint32_t number = look_up(group.front().key);
+    const std::span<const BasisEntry> factors = functions(number);
+    // How far each pixel is from the closest place that was looked at.
+    std::vector<float> distance2(group.size());
+    for (std::size_t k = 0; k < group.size(); ++k)
+        distance2[k] = patch_[number].distance2(pixels.position[group[k].pixel]);
+    const float farthest2 = *std::max_element(distance2.begin(), distance2.end());
     std::vector<BasisEntry> here, expected;
     for (int n = 0; n < places_compared; ++n) {
-        for (std::size_t k = 0; k < group.size(); ++k)
-            distance2[k] = std::min(distance2[k], (pixels.point(group[k].pixel).position
-                                                   - pixels.point(group[seen].pixel).position)
-                                                      .squaredNorm());
-        seen = static_cast<std::size_t>(
+        const auto seen = static_cast<std::size_t>(
             std::max_element(distance2.begin(), distance2.end()) - distance2.begin());
         if (distance2[seen] == 0.0f) break;
         const SurfacePoint x = pixels.point(group[seen].pixel);
@@ -261,9 +283,14 @@ DisplayPatches::State DisplayPatches::compared(const PixelSurfaces& pixels,
         expected.clear();
         basis_.evaluate_or_nearest(level_, x, here);
         basis_.apply_factors(factors, x, expected);
-        if (row_difference(here, expected) > options_.tolerance) return State::delicate;
+        if (row_difference(here, expected) > options_.tolerance) return -1.0f;
+        for (std::size_t k = 0; k < group.size(); ++k)
+            distance2[k] = std::min(distance2[k], (pixels.point(group[k].pixel).position - x.position).squaredNorm());
     }
-    return State::plain;
+    // A little farther, so that not every pixel more is looked at.
+    const float pixel = pixels.pixel_size * (pixels.point(group.front().pixel).position - pixels.eye).norm();
+    const float alike = std::sqrt(farthest2) + 0.25f * pixel;
+    return std::max(patch_[number].alike2, alike * alike);
 }
 
 } // namespace afterglow

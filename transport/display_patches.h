@@ -31,18 +31,18 @@ struct PixelSurfaces {
 /// surface and kept; the kernel and the cosine are evaluated at each pixel.
 ///
 /// A patch is the part of a triangle in a cube of a world grid, whose edges are powers of two. Its
-/// factors are found at the first pixel that shows it, and compared with those at the farthest three:
-/// where the rows there differ by more than `tolerance` (the sum of |differences|), as beside edges and
-/// contacts, the patch is *delicate*, and there are smaller ones in it, as large as a
-/// pixel. Where these are
-/// not there yet the large one does, so that a frame need not wait for all.
+/// factors are found at the first pixel that shows it, and compared with those at the four farthest,
+/// again when pixels show more of it: where the rows there differ by more than `tolerance` (the sum of
+/// |differences|), as beside edges and contacts, the patch is *delicate*, and there are smaller ones in
+/// it, as large as a pixel. Where these are not there yet the large one does, so that a frame need not
+/// wait for all.
 class DisplayPatches {
 public:
     struct Options {
         float patch_pixels = 8.0f; // the longest edge of a cube, in pixels at the pixel's distance
         float small_pixels = 0.5f; // the same of the small patches
         float tolerance = 0.1f;
-        std::size_t most_patches = 2'000'000; // ~120 bytes each; beyond that, all are forgotten
+        std::size_t most_patches = 2'000'000; // ~140 bytes each; beyond that, all are forgotten
     };
     static constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
@@ -55,6 +55,11 @@ public:
     /// patches at any number of threads.
     std::size_t find(const PixelSurfaces& pixels, std::size_t most_new,
                      std::vector<std::uint32_t>& patch);
+
+    /// Goes on with the same pixels, and the same `patch`, where the last find() or refine() left some
+    /// waiting; the time is that of the patches alone.
+    std::size_t refine(const PixelSurfaces& pixels, std::size_t most_new,
+                       std::vector<std::uint32_t>& patch);
 
     std::size_t patches() const { return begin_.size() - 1; }
     /// The functions of a patch by increasing id, with o_j v_j as their values; none where it is not
@@ -69,7 +74,16 @@ public:
     std::uint64_t generation() const { return generation_; }
 
 private:
-    enum class State : std::uint8_t { untested, plain, delicate };
+    struct Patch {
+        std::array<float, 3> place = {}; // where its factors were found [world]
+        /// So far from it factors are known to be alike [world^2]; below zero where it is delicate.
+        float alike2 = 0.0f;
+        bool is_delicate() const { return alike2 < 0.0f; }
+        float distance2(const PixelSurfaces::Float4& x) const {
+            const float a = x[0] - place[0], b = x[1] - place[1], c = x[2] - place[2];
+            return a * a + b * b + c * c;
+        }
+    };
     struct Cell {
         std::uint32_t surface = no_index;
         int size_exponent = 0; // the cube's edge is 2^size_exponent [world]
@@ -85,7 +99,7 @@ private:
     };
     struct WantedLists {
         std::vector<Wanted> large, untested, small;
-        std::size_t small_pixels = 0; // in the list or not
+        std::vector<std::uint32_t> small_pixels; // whose patch is in the list or not
         void append(const WantedLists& more);
     };
     /// Pixels that want the same patch.
@@ -102,9 +116,10 @@ private:
     std::vector<Slot> table_;
     std::vector<std::uint32_t> begin_ = {0};
     std::vector<BasisEntry> entries_;
-    std::vector<State> state_; // a patch each
+    std::vector<Patch> patch_;
     std::uint64_t generation_ = 0;
-    std::size_t waiting_ = 0; // pixels, after the last find()
+    std::vector<std::uint32_t> waiting_; // pixels, after the last find() or refine()
+    std::size_t small_waiting_ = 0;      // those of them that wait for a small patch
 
     Cell cell(const PixelSurfaces& pixels, std::size_t pixel, float size_in_pixels) const;
     std::uint32_t look_up(std::uint64_t key) const;
@@ -114,14 +129,17 @@ private:
     WantedLists look(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
                      double small_share, std::span<std::uint32_t> patch) const;
     /// By key, which is as good as at random.
+    std::size_t serve(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
+                      std::size_t most_new, std::vector<std::uint32_t>& patch);
     static std::vector<Group> group(std::vector<Wanted>& wanted);
     /// The first `count`, thus all over the picture, in the order of their pixels, so that what lies
     /// close is made together and lies close in memory.
     static std::vector<Group> chosen(std::span<const Group> groups, std::size_t count);
     /// A patch for each group, from the first of its pixels.
-    void make(const PixelSurfaces& pixels, std::span<const Group> groups, State state);
+    void make(const PixelSurfaces& pixels, std::span<const Group> groups, bool are_small);
     void test(const PixelSurfaces& pixels, std::span<const Group> groups);
-    State compared(const PixelSurfaces& pixels, const Group& group) const;
+    /// How far factors are alike, now that these pixels show it: see Patch.
+    float compared(const PixelSurfaces& pixels, const Group& group) const;
     void forget_all();
 };
 

@@ -9,15 +9,15 @@
 namespace afterglow {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// Where so much of the links would be multiplied, solving from the start is faster.
 constexpr double most_links = 0.5;
 /// Of the tolerance, what changes that wait may take: less than all, so that a round that is made
 /// does enough for the light to settle soon.
 constexpr double waiting_share = 0.7;
 
-class Stopwatch {
+} // namespace
+
+class MovingLight::Stopwatch {
 public:
     /// Seconds since the last call, added to `sum`.
     void add_to(double& sum) {
@@ -27,10 +27,9 @@ public:
     }
 
 private:
+    using Clock = std::chrono::steady_clock;
     Clock::time_point last_ = Clock::now();
 };
-
-} // namespace
 
 MovingLight::MovingLight(const LightTransport& transport, const Options& options)
     : transport_(transport), options_(options) {
@@ -135,6 +134,34 @@ void MovingLight::follow_brightness(const std::vector<float>& coefficients) {
     if (((factor - 1.0f).abs() > static_cast<float>(options_.tolerance)).any()) scale(factor);
 }
 
+double MovingLight::display_norm() const {
+    const PointHierarchy& points = transport_.transfer().points;
+    const Index first = 9 * static_cast<Index>(points.begin(points.levels() - 1));
+    return std::sqrt(parallel_sum(9 * static_cast<Index>(points.size()) - first, 0.0, [&](Index k) {
+        const double v = field_[static_cast<std::size_t>(first + k)];
+        return v * v;
+    }, 16384));
+}
+
+void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
+    const std::vector<float> coefficients = transport_.coefficients(radiosity(direct));
+    follow_brightness(coefficients);
+    const Changes changed = changes(coefficients);
+    watch.add_to(s.coefficients_seconds);
+    s.settled = changed.effect <= options_.tolerance * field_norm_;
+    if (s.settled) return;
+    s.links_share += static_cast<double>(changed.links) / static_cast<double>(columns_->links());
+    if (static_cast<double>(changed.links) > most_links * static_cast<double>(columns_->links())) {
+        start_anew(direct);
+        s.settled = s.anew = true;
+    } else {
+        columns_->add_product(changed.list, product_);
+        for (const LinkColumns::Change& change : changed.list)
+            std::copy_n(&coefficients[4 * change.sender], 4, &applied_[4 * change.sender]);
+    }
+    watch.add_to(s.links_seconds);
+}
+
 const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightStatistics* statistics) {
     MovingLightStatistics s;
     Stopwatch watch;
@@ -150,31 +177,15 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
     watch.add_to(s.direct_seconds);
     while (!s.settled && (s.rounds < options_.most_rounds || options_.most_rounds == 0)) {
         ++s.rounds;
-        const std::vector<float> coefficients = transport_.coefficients(radiosity(direct));
-        follow_brightness(coefficients);
-        const Changes changed = changes(coefficients);
-        watch.add_to(s.coefficients_seconds);
-        s.settled = changed.effect <= options_.tolerance * field_norm_;
-        if (s.settled) break;
-        s.links_share += static_cast<double>(changed.links) / static_cast<double>(columns_->links());
-        if (static_cast<double>(changed.links) > most_links * static_cast<double>(columns_->links())) {
-            start_anew(direct);
-            s.settled = s.anew = true;
-        } else {
-            columns_->add_product(changed.list, product_);
-            for (const LinkColumns::Change& change : changed.list)
-                std::copy_n(&coefficients[4 * change.sender], 4, &applied_[4 * change.sender]);
-        }
-        watch.add_to(s.links_seconds);
+        const double norm_before = field_norm_;
+        follow_round(direct, s, watch);
+        if (!s.settled && s.rounds != options_.most_rounds) continue;
+        push_field(transport_.transfer().points.levels());
+        field_norm_ = display_norm();
+        // What was small beside the field as it was may not be beside a darker one.
+        if (field_norm_ < 0.9 * norm_before) s.settled = s.anew;
+        watch.add_to(s.push_seconds);
     }
-    const PointHierarchy& points = transport_.transfer().points;
-    push_field(points.levels());
-    const Index first = 9 * static_cast<Index>(points.begin(points.levels() - 1));
-    field_norm_ = std::sqrt(parallel_sum(9 * static_cast<Index>(points.size()) - first, 0.0, [&](Index k) {
-        const double v = field_[static_cast<std::size_t>(first + k)];
-        return v * v;
-    }, 16384));
-    watch.add_to(s.push_seconds);
     if (statistics) *statistics = s;
     return field_;
 }

@@ -66,6 +66,9 @@ private:
         double effect = 0.0;                   // of all changes on the field, root of the sum of squares
     };
     Changes changes(const std::vector<float>& coefficients) const;
+    class Stopwatch;
+    void follow_round(const Radiosity& direct, MovingLightStatistics& statistics, Stopwatch& watch);
+    double display_norm() const;
     void start_anew(const Radiosity& direct);
     /// Of a light that changes its intensity alone, all is known.
     void follow_intensity(const Spotlight& light);

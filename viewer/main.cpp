@@ -2,6 +2,7 @@
 #include "core/parallel.h"
 #include "transport/cli_options.h"
 #include "viewer/headless.h"
+#include "viewer/viewer_app.h"
 
 #include <CLI/CLI.hpp>
 
@@ -26,7 +27,7 @@ void add_options(CLI::App& app, ViewCommand& command) {
     app.add_option("--scene", command.scene, "Where the scene is now");
     app.add_flag("--headless", command.headless, "No window: draw the frames of a path");
     app.add_option("--frames", command.frames.frames, "Path of camera and light (.json)");
-    app.add_option("-o,--output", command.frames.folder, "Folder of the frames and timings.json");
+    app.add_option("-o,--output", command.frames.folder, "Folder of frames, pictures and recorded paths");
     app.add_option("--format", command.frames.format, "Of the frames: png or exr (default png)")
         ->check(CLI::IsMember({"png", "exr"}));
     app.add_option("--samples", command.frames.samples, "Samples a pixel of the frames (default 4)")
@@ -44,6 +45,23 @@ void add_options(CLI::App& app, ViewCommand& command) {
         ->check(CLI::Range(0, 4096));
 }
 
+void open_window(const ViewCommand& command) {
+    const HeadlessOptions& frames = command.frames;
+    if (frames.context != "auto" && frames.context != "glfw")
+        throw UsageError("--context " + frames.context + " has no window; give --headless");
+    ViewerOptions options;
+    options.file = command.file;
+    options.scene = command.scene;
+    options.frames = frames.frames;
+    options.method = frames.method;
+    options.layer = frames.layer;
+    options.width = frames.width;
+    options.height = frames.height;
+    options.exposure = frames.exposure;
+    if (!frames.folder.empty()) options.folder = frames.folder;
+    ViewerApp(options).run();
+}
+
 void run(ViewCommand& command) {
     if (!(command.exposure > 0.0)) throw UsageError("--exposure must be positive");
     HeadlessOptions& frames = command.frames;
@@ -52,11 +70,14 @@ void run(ViewCommand& command) {
     frames.exposure = static_cast<float>(command.exposure);
     frames.width = command.size.width;
     frames.height = command.size.height;
-    if (!command.headless) throw UsageError("there is no window yet; give --headless");
+    const ThreadLimit limit(command.threads);
+    if (!command.headless) {
+        open_window(command);
+        return;
+    }
     if (frames.frames.empty() || frames.folder.empty())
         throw UsageError("--headless needs --frames PATH.json and -o FOLDER");
     if (frames.context == "glfw") throw UsageError("--headless has no window: --context egl or osmesa");
-    const ThreadLimit limit(command.threads);
     const TransferScene scene(command.file, command.scene);
     draw_frames(scene, frames);
 }

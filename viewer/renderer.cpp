@@ -95,7 +95,7 @@ void Renderer::draw(const Camera& camera, ViewLayer layer, std::size_t most_new,
     const bool wants_indirect = is_light(layer) && layer != ViewLayer::direct;
     if (field_ && wants_direct) draw_direct();
     if (field_ && wants_indirect) {
-        if (!pixels_ || patches_missing_ > 0) find_patches(most_new);
+        if (patches_are_old_ || patches_missing_ > 0) find_patches(most_new);
         if (indirect_is_old_) draw_indirect();
     }
     timings_.composition = measured([&] {
@@ -114,7 +114,7 @@ void Renderer::draw_geometry(const Camera& camera, const Vec2& place) {
     camera_ = camera;
     place_ = place;
     pixels_ = nullptr;
-    direct_is_old_ = indirect_is_old_ = true;
+    direct_is_old_ = indirect_is_old_ = patches_are_old_ = true;
 }
 
 void Renderer::draw_direct() {
@@ -128,9 +128,10 @@ void Renderer::draw_direct() {
 
 void Renderer::find_patches(std::size_t most_new) {
     timings_.patches = measured([&] {
-        if (!pixels_) pixels_ = &geometry_.read();
-        patches_missing_ = patches_.find(*pixels_, most_new, patch_);
+        patches_missing_ = patches_are_old_ ? patches_.find(pixels(), most_new, patch_)
+                                            : patches_.refine(pixels(), most_new, patch_);
     });
+    patches_are_old_ = false;
     indirect_is_old_ = true;
 }
 
@@ -153,6 +154,11 @@ void Renderer::draw_indirect() {
     indirect_is_old_ = false;
 }
 
+const PixelSurfaces& Renderer::pixels() {
+    if (!pixels_) pixels_ = &geometry_.read();
+    return *pixels_;
+}
+
 void Renderer::splat() {
     if (splatter_is_old_) splatter_.set(*field_);
     splatter_is_old_ = false;
@@ -161,7 +167,7 @@ void Renderer::splat() {
 
 void Renderer::gather() {
     gathered_.resize(patch_.size());
-    field_->irradiance(*pixels_, patches_, patch_, pixels_->normal, gathered_);
+    field_->irradiance(pixels(), patches_, patch_, pixels().normal, gathered_);
     gl_.BindTexture(GL_TEXTURE_2D, targets_->indirect);
     gl_.TexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, targets_->width, targets_->height, float4_texels.format,
                       float4_texels.type, gathered_.data());

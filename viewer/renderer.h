@@ -61,6 +61,8 @@ public:
     const Composition& composition() const { return composition_; }
     const GeometryBuffer& geometry() const { return geometry_; }
     const SceneMesh& mesh() const { return mesh_; }
+    /// What the pixels of the last picture show.
+    const PixelSurfaces& pixels();
 
 private:
     struct Targets {
@@ -83,7 +85,7 @@ private:
     Spotlight light_;
     std::shared_ptr<const DisplayField> field_;
     bool shadow_map_is_old_ = true, direct_is_old_ = true, indirect_is_old_ = true;
-    bool splatter_is_old_ = true;
+    bool splatter_is_old_ = true, patches_are_old_ = true;
     const PixelSurfaces* pixels_ = nullptr;
     std::vector<std::uint32_t> patch_;
     std::size_t patches_missing_ = 0;

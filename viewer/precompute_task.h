@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <sys/types.h>
+
+namespace afterglow {
+
+/// `afterglow precompute` at work in a process of its own: it can be stopped at any time, and its file
+/// appears whole or not at all.
+class PrecomputeTask {
+public:
+    enum class State { at_work, done, failed };
+
+    /// Starts it; the program lies beside this one, or where PATH says. Throws Error where it cannot be
+    /// started.
+    PrecomputeTask(const std::string& scene, const std::string& file);
+    /// Stops it.
+    ~PrecomputeTask();
+    PrecomputeTask(const PrecomputeTask&) = delete;
+    PrecomputeTask& operator=(const PrecomputeTask&) = delete;
+
+    State state();
+    const std::string& file() const { return file_; }
+    double seconds() const; // since it was started
+    /// The last line it wrote: how it goes, or why it failed.
+    const std::string& message() const { return message_; }
+
+private:
+    std::string file_, message_;
+    double start_ = 0.0;
+    pid_t process_ = -1;
+    int output_ = -1;
+    State state_ = State::at_work;
+
+    void read_output();
+};
+
+} // namespace afterglow
