@@ -63,7 +63,8 @@ class Window:
                        stdout=subprocess.DEVNULL)
 
     def key(self, name):
-        self.do("key", "--window", self.name, name)
+        self.do("windowfocus", self.name)
+        self.do("key", name)
 
     def at(self, x, y):
         self.do("mousemove", "--window", self.name, x, y)
@@ -83,8 +84,13 @@ class Window:
         """The file that a key makes."""
         before = self.files(pattern)
         self.key(key)
-        new = wait_for(lambda: [f for f in self.files(pattern) if f not in before], pattern)
-        return new[0]
+
+        def new():
+            if self.program.poll() is not None:
+                sys.exit(f"the window ended with {self.program.returncode}: "
+                         + (self.folder / "stderr").read_text())
+            return [f for f in self.files(pattern) if f not in before]
+        return wait_for(new, pattern)[0]
 
     def command_line(self):
         def lines():
@@ -98,7 +104,7 @@ class Window:
         last = None
         for _ in range(40):
             time.sleep(0.5)
-            picture = self.makes("p", "picture_*.png")
+            picture = self.makes("p", "picture_*.exr")  # written last
             content = picture.read_bytes()
             for file in self.files("picture_*"):
                 file.unlink()
@@ -144,8 +150,8 @@ def expect_like_headless(window, file, layer, folder):
 
 def run(folder):
     file = folder / "cornell.afterglow"
-    subprocess.run([afterglow, "precompute", "builtin:cornell", "-o", file, "--coarse-radius", "0.4",
-                    "--receiver-levels", "3", "--sender-levels", "2", "--rays", "64", "--quiet"], check=True)
+    subprocess.run([afterglow, "precompute", "builtin:cornell", "-o", file, "--rays", "128",
+                    "--receiver-levels", "4", "--sender-levels", "3", "--quiet"], check=True)
     with Screen() as screen:
         window = Window(screen, file, folder)
         first = window.makes("F12", "window_*.png").read_bytes()
@@ -187,9 +193,9 @@ def run(folder):
         window.at(*middle)
         window.do("click", 4)
         expect_moved(camera, "zoom")
-        window.do("keydown", "--window", window.name, "s")
+        window.do("keydown", "s")
         time.sleep(0.5)
-        window.do("keyup", "--window", window.name, "s")
+        window.do("keyup", "s")
         expect_moved(camera, "fly")
 
         # Every layer, then every view over the picture.
@@ -222,7 +228,7 @@ def run(folder):
         window.do("windowunmap", window.name)
         time.sleep(0.5)
         window.do("windowmap", window.name)
-        time.sleep(0.5)
+        time.sleep(2)
         expect_like_headless(window, file, "full", folder)
 
         window.key("Escape")
