@@ -134,7 +134,7 @@ DisplayPatches::WantedLists DisplayPatches::look(const PixelSurfaces& pixels,
                     continue;
                 }
                 here.small_pixels.push_back(p);
-                if (static_cast<std::uint32_t>(hash64(small_key)) <= largest)
+                if (static_cast<std::uint32_t>(hash64(small_key, calls_)) <= largest)
                     here.small.push_back({small_key, p, small.size_exponent});
             }
         }
@@ -187,6 +187,7 @@ std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const s
             for (const Wanted& w : g) list.push_back(w.pixel);
         return list;
     };
+    ++calls_;
     // As many small patches are wanted as pixels waited, or fewer: twice what is needed will do.
     const double small_share = std::min(1.0, 2.0 * static_cast<double>(most_new)
                                                  / static_cast<double>(std::max<std::size_t>(1, small_waiting_)));

@@ -120,6 +120,7 @@ private:
     std::uint64_t generation_ = 0;
     std::vector<std::uint32_t> waiting_; // pixels, after the last find() or refine()
     std::size_t small_waiting_ = 0;      // those of them that wait for a small patch
+    std::uint64_t calls_ = 0;            // each draws other patches by lot
 
     Cell cell(const PixelSurfaces& pixels, std::size_t pixel, float size_in_pixels) const;
     std::uint32_t look_up(std::uint64_t key) const;

@@ -8,8 +8,8 @@
 namespace afterglow {
 namespace {
 
-constexpr float widest_single = 50.0f; // half-angle of the cone [degrees]
-constexpr int single_side = 2048, cube_side = 1536;
+constexpr float widest_single = 45.0f; // half-angle of the cone [degrees]
+constexpr int single_side = 2048, cube_side = 2048;
 constexpr float margin = 4.0f; // texels around what is needed, for the blend
 
 const char* const distance_vertex_shader = R"(
