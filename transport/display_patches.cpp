@@ -175,8 +175,15 @@ std::size_t DisplayPatches::find(const PixelSurfaces& pixels, std::size_t most_n
 
 std::size_t DisplayPatches::refine(const PixelSurfaces& pixels, std::size_t most_new,
                                    std::vector<std::uint32_t>& patch) {
-    const std::vector<std::uint32_t> waiting = std::move(waiting_);
-    return serve(pixels, waiting, most_new, patch);
+    // As many as can be served; the others wait on.
+    std::vector<std::uint32_t> waiting = std::move(waiting_);
+    const std::size_t served = std::min(waiting.size(), std::max<std::size_t>(most_new, 1000));
+    const std::uint64_t generation = generation_;
+    serve(pixels, std::span(waiting).first(served), most_new, patch);
+    if (generation_ == generation)
+        waiting_.insert(waiting_.begin(), waiting.begin() + static_cast<std::ptrdiff_t>(served), waiting.end());
+    small_waiting_ = waiting_.size();
+    return waiting_.size();
 }
 
 std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
@@ -190,7 +197,7 @@ std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const s
     ++calls_;
     // As many small patches are wanted as pixels waited, or fewer: twice what is needed will do.
     const double small_share = std::min(1.0, 2.0 * static_cast<double>(most_new)
-                                                 / static_cast<double>(std::max<std::size_t>(1, small_waiting_)));
+                                                 / static_cast<double>(std::clamp<std::size_t>(small_waiting_, 1, which.size() + 1)));
     WantedLists wanted = look(pixels, which, small_share, patch);
 
     std::vector<Group> large = group(wanted.large);

@@ -23,7 +23,7 @@ struct ViewCommand {
 };
 
 void add_options(CLI::App& app, ViewCommand& command) {
-    app.add_option("file", command.file, "Transfer file")->required();
+    app.add_option("file", command.file, "Transfer file; in a window also a scene (.obj)")->required();
     app.add_option("--scene", command.scene, "Where the scene is now");
     app.add_flag("--headless", command.headless, "No window: draw the frames of a path");
     app.add_option("--frames", command.frames.frames, "Path of camera and light (.json)");

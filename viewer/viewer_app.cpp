@@ -48,7 +48,7 @@ ViewerApp::ViewerApp(const ViewerOptions& options)
     ImGui_ImplOpenGL3_Init("#version 330 core");
     try {
         open(options.file);
-        if (!session_) throw Error(message_);
+        if (!session_ && !precompute_) throw Error(message_);
         if (!options.frames.empty()) {
             path_ = read_frame_path(options.frames);
             playing_since_ = now();
@@ -323,6 +323,11 @@ void ViewerApp::step() {
             message_ = precompute_->message();
         precompute_.reset();
     }
+    if (!session_) {
+        if (!precompute_) throw Error(message_);
+        draw_waiting();
+        return;
+    }
     const Camera before = session_->camera;
     play();
     fly_with_keys(seconds);
@@ -344,6 +349,22 @@ void ViewerApp::step() {
         picture_is_old_ = true;
     if (picture_is_old_) draw_picture();
     draw_window();
+}
+
+void ViewerApp::draw_waiting() {
+    const Gl& gl = window_.gl();
+    gl.BindFramebuffer(GL_FRAMEBUFFER, 0);
+    gl.ClearColor(0.1f, 0.1f, 0.1f, 1.0f);
+    gl.Clear(GL_COLOR_BUFFER_BIT);
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+    ImGui::SetNextWindowPos({10.0f, 10.0f}, ImGuiCond_FirstUseEver);
+    if (ImGui::Begin("Afterglow", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) draw_precompute_panel();
+    ImGui::End();
+    ImGui::Render();
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    window_.swap();
 }
 
 void ViewerApp::draw_window() {
@@ -371,8 +392,8 @@ void ViewerApp::run() {
     last_time_ = now();
     while (!window_.should_close()) {
         const bool moves = picture_is_old_ || playing_since_ || recording_since_
-                           || session_->light_thread.is_busy();
-        window_.handle_events(moves ? 0.0 : 0.05);
+                           || (session_ && session_->light_thread.is_busy());
+        window_.handle_events(!session_ ? 0.1 : moves ? 0.0 : 0.05);
         step();
         const std::vector<std::string>& errors = window_.gl().errors();
         if (!errors.empty()) throw Error("OpenGL: " + errors.front());

@@ -14,7 +14,8 @@
 namespace afterglow {
 
 struct ViewerOptions {
-    std::string file, scene; // a transfer file; where its scene is now
+    /// A transfer file, or an OBJ file, which is precomputed first; where its scene is now.
+    std::string file, scene;
     std::string frames;      // a path to be played at once
     IndirectMethod method = IndirectMethod::automatic;
     ViewLayer layer = ViewLayer::full;
@@ -88,6 +89,7 @@ private:
     void step();
     void draw_picture();
     void draw_window();
+    void draw_waiting(); // for the first file to be precomputed
     void write_picture();
     void write_screenshot(const std::string& name);
     void toggle_recording();
