@@ -353,25 +353,39 @@ TEST(PathTracer, APictureOfAFurnaceWithNormalMapsIsItsClosedForm) {
 }
 
 TEST(PathTracer, ANormalMapShowsNoLightFromBelowTheSurface) {
-    // A ground, a roof without holes over half of it, and a light that shines on the ground beside: the
-    // roof's upper side looks down at what is lit, but for its own plane.
-    Scene scene = sphere_with_tilted_normals(60.0);
-    scene.normals.clear(), scene.normal_indices.clear();
-    scene.positions = {{0, 0, 0}, {4, 0, 0}, {4, 0, 4}, {0, 0, 4}, {-2, 1, 0}, {0, 1, 0}, {0, 1, 4}, {-2, 1, 4}};
-    scene.triangles = {{2, 1, 0}, {3, 2, 0}, {6, 5, 4}, {7, 6, 4}};
-    scene.material_index.assign(4, 0);
-    scene.texture_coordinates = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    scene.texture_indices = {{2, 1, 0}, {3, 2, 0}, {2, 1, 0}, {3, 2, 0}}; // u along x
-    const Surface surface(scene);
-    const Spotlight light = hard_spot(Vec3(2, 0.5f, 2), -Vec3::UnitY(), 60.0f);
-    Camera camera{.position = Vec3(-1, 3, 2), .target = Vec3(-1, 1, 2), .up = Vec3::UnitX(), .vertical_fov = 20.0f, .width = 8, .height = 8};
+    // A ground whose vertex normals lean by 45 degrees to +x and which its map turns by 75 to -x, where
+    // a low wall is lit: above the bent normal's horizon, and below the surface's, as its own normal says.
+    const double turn = 75.0 * pi / 180.0;
+    Scene leaning;
+    leaning.positions = {{-0.2f, 0, -0.2f}, {0.2f, 0, -0.2f}, {0.2f, 0, 0.2f}, {-0.2f, 0, 0.2f},
+                         {-2, 0, -1},       {-2, 0.95f, -1},  {-2, 0.95f, 1},  {-2, 0, 1}};
+    leaning.triangles = {{2, 1, 0}, {3, 2, 0}, {4, 5, 6}, {4, 6, 7}};
+    leaning.normals = {Vec3(1, 1, 0).normalized()};
+    const Triangle none = {no_index, no_index, no_index};
+    leaning.normal_indices = {{0, 0, 0}, {0, 0, 0}, none, none};
+    leaning.texture_coordinates = {{0, 0}, {1, 0}, {1, 1}, {0, 1}}; // u along x
+    leaning.texture_indices = {{2, 1, 0}, {3, 2, 0}, none, none};
+    leaning.materials.resize(1);
+    leaning.materials[0].normal_map = 0;
+    leaning.material_index.assign(4, 0);
+    leaning.normal_maps = {{1, 1, {static_cast<float>(-std::sin(turn)), 0.0f, static_cast<float>(std::cos(turn))}}};
+    Scene upright = leaning; // the same map shows the wall where the surface does not lean away
+    upright.normal_indices.clear();
+
+    const Vec3 beside_wall(-1.5f, 0.5f, 0);
+    Camera camera{.position = Vec3(0, 3, 0), .target = Vec3::Zero(), .up = Vec3::UnitX(), .vertical_fov = 5.0f, .width = 8, .height = 8};
     camera.check();
-    const Hit hit = surface.closest_hit({camera.position, -Vec3::UnitY()});
-    ASSERT_GT(surface.shown_normal(hit, surface.point(hit)).dot(Vec3(3, -1, 0).normalized()), 0.1f);
-    for (const PathStrategy strategy : {PathStrategy::plain, PathStrategy::connected}) {
-        const PictureEstimate full = render_reference(surface, light, camera, Layer::full, {.samples = 256, .seed = 2, .strategy = strategy});
-        EXPECT_EQ(*std::max_element(full.image.rgb.begin(), full.image.rgb.end()), 0.0f);
-    }
+    for (const PathStrategy strategy : {PathStrategy::plain, PathStrategy::connected})
+        for (const auto& [layer, light] : {std::pair(Layer::indirect, hard_spot(beside_wall, -Vec3::UnitX(), 40.0f)),
+                                           std::pair(Layer::direct, hard_spot(beside_wall, -beside_wall, 40.0f))}) {
+            const auto brightest = [&](const Scene& scene) {
+                const Surface surface(scene);
+                const Image image = render_reference(surface, light, camera, layer, {.samples = 256, .seed = 2, .strategy = strategy}).image;
+                return *std::max_element(image.rgb.begin(), image.rgb.end());
+            };
+            EXPECT_EQ(brightest(leaning), 0.0f) << layer_name(layer) << ", " << strategy_name(strategy);
+            EXPECT_GT(brightest(upright), 0.0f) << layer_name(layer) << ", " << strategy_name(strategy);
+        }
 }
 
 TEST(PathTracer, APictureOfAFurnaceIsItsClosedForm) {
