@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/normal_map.h"
 #include "core/polygon.h"
 
 #include <Eigen/Geometry>
@@ -11,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -140,9 +142,18 @@ private:
 // ---- Materials and textures
 // -------------------------------------------------------------------------
 
+/// A picture of normals, or of heights if it does not look like normals.
+struct NormalSource {
+    std::string file; // path, empty where there is none
+    bool may_be_heights = false;
+    float multiplier = 1.0f; // of heights
+    auto operator<=>(const NormalSource&) const = default;
+};
+
 struct MaterialSource {
     Material material;
     std::string texture_file; // path, empty where there is none
+    NormalSource normals;
 };
 
 /// Names in OBJ and MTL files may be written on another system.
@@ -194,6 +205,13 @@ private:
         source.material.reflectance = Rgb(from.diffuse[0], from.diffuse[1], from.diffuse[2]);
         if (!trimmed(from.diffuse_texname).empty())
             source.texture_file = beside(folder, from.diffuse_texname).string();
+        if (!trimmed(from.normal_texname).empty()) {
+            source.normals = {beside(folder, from.normal_texname).string(), false, 1.0f};
+        } else if (!trimmed(from.bump_texname).empty()) {
+            const float given = from.bump_texopt.bump_multiplier;
+            const float multiplier = std::isfinite(given) ? std::clamp(given, -1e6f, 1e6f) : 1.0f;
+            source.normals = {beside(folder, from.bump_texname).string(), true, multiplier};
+        }
         return source;
     }
 
@@ -208,8 +226,9 @@ float linear_from_srgb(int byte) {
     return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
 }
 
-/// Throws FileError where the file holds no picture that stb_image reads.
-Texture read_texture(const std::string& path) {
+/// A picture whose bytes stand for the numbers of a table. Throws FileError where the file holds none
+/// that stb_image reads.
+Texture read_picture(const std::string& path, const std::array<float, 256>& value) {
     const MappedFile file(path);
     const auto bytes = file.bytes();
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
@@ -224,17 +243,31 @@ Texture read_texture(const std::string& path) {
         stbi_image_free);
     if (!texels) throw FileError(path, "is damaged");
 
-    std::array<float, 256> linear{};
-    for (int i = 0; i < 256; ++i)
-        linear[static_cast<std::size_t>(i)] = linear_from_srgb(i);
     const std::size_t row = 3 * static_cast<std::size_t>(texture.width);
     texture.rgb.resize(row * static_cast<std::size_t>(texture.height));
     for (int y = 0; y < texture.height; ++y) { // the file's first row is on top
         const stbi_uc* from = texels.get() + row * static_cast<std::size_t>(texture.height - 1 - y);
         std::transform(from, from + row, &texture.rgb[row * static_cast<std::size_t>(y)],
-                       [&](stbi_uc byte) { return linear[byte]; });
+                       [&](stbi_uc byte) { return value[byte]; });
     }
     return texture;
+}
+
+Texture read_texture(const std::string& path) {
+    std::array<float, 256> linear{};
+    for (int i = 0; i < 256; ++i)
+        linear[static_cast<std::size_t>(i)] = linear_from_srgb(i);
+    return read_picture(path, linear);
+}
+
+Texture read_normal_map(const NormalSource& source) {
+    std::array<float, 256> share{};
+    for (int i = 0; i < 256; ++i)
+        share[static_cast<std::size_t>(i)] = static_cast<float>(i) / 255.0f;
+    Texture picture = read_picture(source.file, share);
+    return source.may_be_heights && !is_normal_map(picture)
+               ? normals_from_heights(picture, source.multiplier)
+               : normals_from_colours(std::move(picture));
 }
 
 // ---- Faces
@@ -486,21 +519,31 @@ private:
             clamped = clamped || value != given;
         }
         scene_.summary.clamped_reflectance += clamped;
-        if (!source.texture_file.empty()) material.texture = texture_of(source.texture_file);
+        if (!source.texture_file.empty())
+            material.texture = index_of(source.texture_file, source.texture_file, texture_by_file_,
+                                        scene_.textures, [&] { return read_texture(source.texture_file); });
+        if (!source.normals.file.empty())
+            material.normal_map = index_of(source.normals, source.normals.file, normal_map_by_source_,
+                                           scene_.normal_maps, [&] { return read_normal_map(source.normals); });
         return material;
     }
 
-    std::uint32_t texture_of(const std::string& file) {
-        const auto [known, is_new] = texture_by_file_.try_emplace(file, no_index);
+    /// Index in `pictures`, where it is read into when it is first asked for; no_index where it cannot
+    /// be read.
+    template <class Source, class Read>
+    std::uint32_t index_of(const Source& source, const std::string& file,
+                           std::map<Source, std::uint32_t>& known, std::vector<Texture>& pictures,
+                           const Read& read) {
+        const auto [entry, is_new] = known.try_emplace(source, no_index);
         if (is_new) {
             try {
-                scene_.textures.push_back(read_texture(file));
-                known->second = static_cast<std::uint32_t>(scene_.textures.size() - 1);
+                pictures.push_back(read());
+                entry->second = static_cast<std::uint32_t>(pictures.size() - 1);
             } catch (const FileError&) {
                 scene_.summary.missing_files.push_back(file);
             }
         }
-        return known->second;
+        return entry->second;
     }
 
     RawObj& raw_;
@@ -508,6 +551,7 @@ private:
     std::vector<bool> normal_usable_, texture_usable_;
     std::vector<std::uint32_t> new_material_;
     std::map<std::string, std::uint32_t> texture_by_file_;
+    std::map<NormalSource, std::uint32_t> normal_map_by_source_;
     std::vector<Vec3> polygon_;
     std::vector<std::array<std::uint32_t, 3>> cuts_;
 };

@@ -83,7 +83,8 @@ Eigen::AlignedBox3f Scene::bounds() const {
 }
 
 std::string Scene::content_hash() const {
-    // Hash of the parts' hashes: names, summary and viewpoint are not part of what light sees.
+    // Hash of the parts' hashes: names, summary, viewpoint and normal maps are not part of what light
+    // sees.
     std::string parts = hash_of(positions) + hash_of(triangles) + hash_of(normals)
                         + hash_of(normal_indices) + hash_of(texture_coordinates)
                         + hash_of(texture_indices) + hash_of(material_index);

@@ -14,8 +14,8 @@ namespace afterglow {
 inline constexpr std::uint32_t no_index = std::numeric_limits<std::uint32_t>::max();
 using Triangle = std::array<std::uint32_t, 3>; // three indices, counter-clockwise from the front
 
-/// A picture whose texels multiply a material's reflectance. Linear light, row 0 at the bottom
-/// (v = 0), repeats in u and v, bilinear.
+/// A picture of three numbers a texel: in linear light, what multiplies a material's reflectance, or
+/// directions, see normal_map.h. Row 0 at the bottom (v = 0), repeats in u and v, bilinear.
 struct Texture {
     int width = 0, height = 0;
     std::vector<float> rgb; // 3 * width * height
@@ -27,6 +27,7 @@ struct Material {
     std::string name;
     Rgb reflectance = Rgb::Constant(0.5f); // [0, 1), times the texture where there is one
     std::uint32_t texture = no_index;
+    std::uint32_t normal_map = no_index; // of Scene::normal_maps
 };
 
 /// What the loader met and mended, for the one summary line.
@@ -54,11 +55,13 @@ struct Scene {
     std::vector<std::uint32_t> material_index; // a triangle each
     std::vector<Material> materials;
     std::vector<Texture> textures;
+    std::vector<Texture> normal_maps; // unit vectors, see normal_map.h
     std::optional<Vec3> viewpoint; // a place in the open from which the scene is looked at, where known
     SceneSummary summary;
 
     Eigen::AlignedBox3f bounds() const;
-    /// 128-bit hash of everything that light transport sees, as 32 hexadecimal digits.
+    /// 128-bit hash of everything that light transport sees, as 32 hexadecimal digits. Normal maps are
+    /// not part of it: only pictures see them, and a transfer file fits the scene with others as well.
     std::string content_hash() const;
 };
 

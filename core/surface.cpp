@@ -1,6 +1,7 @@
 #include "core/surface.h"
 
 #include "core/error.h"
+#include "core/normal_map.h"
 
 #include <embree3/rtcore.h>
 
@@ -178,12 +179,24 @@ SurfacePoint Surface::point(const Hit& hit) const {
 Rgb Surface::reflectance(const Hit& hit) const {
     const Material& material = scene_.materials[scene_.material_index[hit.primitive]];
     if (material.texture == no_index || scene_.texture_indices.empty()) return material.reflectance;
+    if (scene_.texture_indices[hit.primitive][0] == no_index) return material.reflectance;
+    return material.reflectance
+           * scene_.textures[material.texture].sample(texture_coordinates(hit));
+}
+
+Vec3 Surface::shown_normal(const Hit& hit, const SurfacePoint& x) const {
+    const Material& material = scene_.materials[scene_.material_index[hit.primitive]];
+    if (material.normal_map == no_index) return x.normal;
+    const Tangent tangent = tangent_of(scene_, hit.primitive);
+    if (tangent.direction.isZero()) return x.normal;
+    const Vec3 mapped = scene_.normal_maps[material.normal_map].sample(texture_coordinates(hit));
+    return mapped_normal(mapped, tangent, x.normal, geometric_normal(hit), hit.back_side);
+}
+
+Vec2 Surface::texture_coordinates(const Hit& hit) const {
     const Triangle& t = scene_.texture_indices[hit.primitive];
-    if (t[0] == no_index) return material.reflectance;
-    const Vec2 uv = (1.0f - hit.u - hit.v) * scene_.texture_coordinates[t[0]]
-                    + hit.u * scene_.texture_coordinates[t[1]]
-                    + hit.v * scene_.texture_coordinates[t[2]];
-    return material.reflectance * scene_.textures[material.texture].sample(uv);
+    return (1.0f - hit.u - hit.v) * scene_.texture_coordinates[t[0]]
+           + hit.u * scene_.texture_coordinates[t[1]] + hit.v * scene_.texture_coordinates[t[2]];
 }
 
 } // namespace afterglow

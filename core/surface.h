@@ -51,6 +51,10 @@ public:
     /// Position from barycentric weights, and the shading normal (interpolated where the scene has
     /// normals) turned to the side the ray came from.
     SurfacePoint point(const Hit& hit) const;
+    /// The normal with which a picture shows the hit, whose point() is x: x.normal, bent by the
+    /// material's normal map where there is one and the triangle has texture coordinates; on the same
+    /// side of the triangle as x.normal. Light transport and the basis do not see it.
+    Vec3 shown_normal(const Hit& hit, const SurfacePoint& x) const;
     /// The triangle's own normal, turned likewise.
     Vec3 geometric_normal(const Hit& hit) const;
     /// Reflectance at the hit, textures included.
@@ -64,6 +68,8 @@ private:
     const Scene& scene_;
     float lift_;
     std::unique_ptr<Tree> tree_;
+
+    Vec2 texture_coordinates(const Hit& hit) const;
 };
 
 } // namespace afterglow

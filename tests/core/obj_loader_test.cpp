@@ -48,6 +48,7 @@ void expect_sound(const Scene& scene) {
     for (const Material& m : scene.materials) {
         ASSERT_TRUE((m.reflectance >= 0.0f).all() && (m.reflectance < 1.0f).all());
         ASSERT_TRUE(m.texture == no_index || m.texture < scene.textures.size());
+        ASSERT_TRUE(m.normal_map == no_index || m.normal_map < scene.normal_maps.size());
     }
     EXPECT_EQ(scene.summary.triangles, scene.triangles.size());
 }
@@ -251,7 +252,7 @@ TEST(ObjLoader, SurvivesRandomTextOfItsOwnWords) {
                                  "\nvt 3 1 ",
                                  "\nusemtl 1\n"};
     const TemporaryFolder folder;
-    folder.write("x.mtl", "newmtl 1\nKd 0.2 0.4 0.6\nmap_Kd x.obj\nnewmtl\nKd\nmap_Kd\n");
+    folder.write("x.mtl", "newmtl 1\nKd 0.2 0.4 0.6\nmap_Kd x.obj\nnorm x.obj\nnewmtl\nKd\nmap_Kd\nbump -bm\nnorm\n");
     int loaded = 0;
     for (std::uint64_t seed = 0; seed < 300; ++seed) {
         Rng rng(seed, 1);
