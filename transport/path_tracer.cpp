@@ -19,15 +19,22 @@ constexpr std::size_t block_size = 64; // paths that advance together, for packe
 /// Where a path starts, and the factor from its irradiance to what is asked.
 struct PathStart {
     SurfacePoint x;
+    Vec3 normal; // irradiance is asked for with it; x.normal, or what a normal map makes of it
     Rgb weight = Rgb::Ones();
     std::uint32_t index = 0; // of its sample in the sequence
 };
 
 struct Path {
     SurfacePoint x;
+    Vec3 normal; // as PathStart has it; x.normal from the first bounce on
     Rgb weight, throughput;
     std::uint32_t index;
     std::uint32_t slot; // of the light vertices it is joined with
+
+    /// Whether a direction lies below the surface at x, though above `normal`'s horizon.
+    bool is_below(const Vec3& direction) const {
+        return normal != x.normal && direction.dot(x.normal) <= 0.0f;
+    }
 };
 
 /// The lights, and what joining paths to their rays needs.
@@ -55,7 +62,7 @@ public:
         std::size_t alive = 0;
         for (const PathStart& start : starts) {
             const auto slot = static_cast<std::uint32_t>(alive);
-            work.paths[alive++] = {start.x, start.weight, Rgb::Ones(), start.index, slot};
+            work.paths[alive++] = {start.x, start.normal, start.weight, Rgb::Ones(), start.index, slot};
         }
         std::uint64_t rays = connected() ? trace_from_lights(seed, starts, work) : 0;
         for (std::uint64_t depth = 0; alive > 0; ++depth) {
@@ -64,7 +71,7 @@ public:
                 const Path& path = work.paths[k];
                 if (connected()) rays += connect(path, sums, work);
                 const Vec3 local = sample_cosine(shuffled_sobol2(path.index, bounce_seed));
-                work.rays[k] = {surface_.lifted(path.x), Frame(path.x.normal).to_world(local)};
+                work.rays[k] = {surface_.lifted(path.x), Frame(path.normal).to_world(local)};
             }
             surface_.closest_hits({work.rays.data(), alive}, {work.hits.data(), alive});
             rays += alive;
@@ -72,9 +79,11 @@ public:
             std::size_t survivors = 0;
             for (std::size_t k = 0; k < alive; ++k) {
                 const Hit& hit = work.hits[k];
-                if (!hit) continue;
+                if (!hit || work.paths[k].is_below(work.rays[k].direction)) continue;
                 Path path = work.paths[k];
-                const SurfacePoint from = std::exchange(path.x, surface_.point(hit));
+                const SurfacePoint from{path.x.position, path.normal};
+                path.x = surface_.point(hit);
+                path.normal = path.x.normal;
                 path.throughput *= surface_.reflectance(hit);
                 rays += add_direct_light(path, from, hit, sums);
                 // Below one, so that even a scene of reflectance one lets every path end.
@@ -134,10 +143,13 @@ private:
             const LightVertex& y = work.vertices[block_size * l + path.slot];
             if ((y.radiosity == 0.0f).all()) continue;
             const Vec3 to_y = y.x.position - path.x.position;
-            if (to_y.dot(path.x.normal) <= 0.0f || to_y.dot(y.geometric_normal) >= 0.0f) continue;
+            if (to_y.dot(path.normal) <= 0.0f || path.is_below(to_y)
+                || to_y.dot(y.geometric_normal) >= 0.0f)
+                continue;
             ++rays;
             if (surface_.blocked(surface_.lifted(path.x), surface_.lifted(y.x))) continue;
-            const float share = cosine_share(path.x, y.x.position, y.geometric_normal, y.pdf);
+            const float share = cosine_share({path.x.position, path.normal}, y.x.position,
+                                             y.geometric_normal, y.pdf);
             sums[l] += (path.weight * path.throughput * y.radiosity * share).cast<double>();
         }
         return rays;
@@ -169,7 +181,8 @@ IrradianceEstimate estimate_irradiance(const Surface& surface, std::span<const S
         for (Index done = 0; done < count;) {
             std::size_t used = 0;
             for (; used < block_size && done < count; ++used, ++done)
-                starts[used] = {points[static_cast<std::size_t>(item)], Rgb::Ones(),
+                starts[used] = {points[static_cast<std::size_t>(item)],
+                                points[static_cast<std::size_t>(item)].normal, Rgb::Ones(),
                                 static_cast<std::uint32_t>(first + done)};
             rays += tracer.trace(seed, {starts.data(), used}, sums, work);
         }
@@ -260,11 +273,12 @@ PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
                     layer == Layer::irradiance
                         ? Rgb(Rgb::Ones())
                         : Rgb(surface.reflectance(hits[k]) / static_cast<float>(EIGEN_PI));
-                starts[seen++] = {surface.point(hits[k]), weight, index[k]};
+                const SurfacePoint x = surface.point(hits[k]);
+                const Vec3 shown = surface.shown_normal(hits[k], x);
+                starts[seen++] = {x, shown, weight, index[k]};
                 if (!wants_direct) continue;
                 ++ray_count;
-                sums[0] +=
-                    (weight * direct_irradiance(surface, light, starts[seen - 1].x)).cast<double>();
+                sums[0] += (weight * direct_irradiance(surface, light, x, shown)).cast<double>();
             }
             if (wants_indirect) ray_count += tracer.trace(seed, {starts.data(), seen}, sums, work);
         }

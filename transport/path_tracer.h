@@ -53,7 +53,7 @@ struct IrradianceEstimate {
 /// y_k the vertices that a path from x meets. Paths end by Russian roulette alone, with the
 /// survival probability of their largest throughput: unbiased, any number of bounces. All lights
 /// are seen from the same paths. What a ray meets counts with the shading normal that
-/// Surface::point() turns to the ray's side.
+/// Surface::point() turns to the ray's side: normal maps bend no path.
 ///
 /// lights are checked already. Results depend on the seed, not on the number of threads.
 IrradianceEstimate estimate_irradiance(const Surface& surface, std::span<const Spotlight> lights,
@@ -77,7 +77,11 @@ struct PictureEstimate {
     std::uint64_t samples = 0, rays = 0;
 };
 
-/// Camera rays are jittered over each pixel, a sample each.
+/// Camera rays are jittered over each pixel, a sample each. What they meet shows the irradiance under
+/// its Surface::shown_normal m, of the light that arrives from above the surface, whose normal is n:
+///
+///     E = integral over n . w > 0 of L(w) max(0, m . w) dw.
+///
 PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
                                  const Camera& camera, Layer layer,
                                  const PathTracerOptions& options);

@@ -57,4 +57,13 @@ Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const Surf
     return irradiance;
 }
 
+Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const SurfacePoint& x,
+                      const Vec3& shown) {
+    const Rgb irradiance = unoccluded_irradiance(light, {x.position, shown});
+    if ((irradiance == 0.0f).all() || (unoccluded_irradiance(light, x) == 0.0f).all()
+        || surface.blocked(surface.lifted(x), light.position))
+        return Rgb::Zero();
+    return irradiance;
+}
+
 } // namespace afterglow

@@ -28,4 +28,9 @@ Rgb unoccluded_irradiance(const Spotlight& light, const SurfacePoint& x);
 /// included.
 Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const SurfacePoint& x);
 
+/// The same with the normal that a picture shows there (Surface::shown_normal): the cosine is that of
+/// `shown`, and light from below the surface, as x.normal has it, is none.
+Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const SurfacePoint& x,
+                      const Vec3& shown);
+
 } // namespace afterglow

@@ -312,6 +312,68 @@ TEST_F(InTheCornellBox, AFullPictureIsDirectPlusIndirectAndBlackOutside) {
     EXPECT_LT(black, 24 * 16 * 3 / 4);
 }
 
+/// The sphere of radius one with normals tilted by `degrees`, in a direction of each triangle's own.
+Scene sphere_with_tilted_normals(double degrees) {
+    Scene scene = make_builtin_scene("builtin:sphere:0.5");
+    const double angle = degrees * pi / 180.0;
+    scene.normal_maps = {{1, 1, {static_cast<float>(std::sin(angle)), 0.0f, static_cast<float>(std::cos(angle))}}};
+    for (Material& material : scene.materials) material.normal_map = 0;
+    scene.texture_coordinates = {{0.0f, 0.0f}, {1.0f, 0.0f}, {0.0f, 1.0f}};
+    scene.texture_indices.assign(scene.triangles.size(), {0, 1, 2});
+    return scene;
+}
+
+// A light in all directions from the centre makes radiance uniform, and B = rho E: under a normal at
+// the angle a to the surface's, the half-space above the surface gives (1 + cos a) / 2 of E; all of
+// the hemisphere about that normal would give E.
+TEST(PathTracer, APictureOfAFurnaceWithNormalMapsIsItsClosedForm) {
+    const Spotlight light = hard_spot(Vec3::Zero(), -Vec3::UnitY(), 180.0f);
+    Camera camera{.position = Vec3(0.3f, 0.1f, 0.0f), .target = Vec3::UnitX(), .width = 24, .height = 24};
+    camera.check();
+    for (const double degrees : {0.0, 30.0, 60.0}) {
+        const Scene scene = sphere_with_tilted_normals(degrees);
+        const Surface surface(scene);
+        const double cosine = std::cos(degrees * pi / 180.0);
+        for (const PathStrategy strategy : {PathStrategy::plain, PathStrategy::connected}) {
+            const auto mean = [&](Layer layer, double& error) {
+                const PictureEstimate picture = render_reference(
+                    surface, light, camera, layer, {.target_error = 0.05, .seed = 9, .strategy = strategy});
+                error = std::max(1e-4, picture.relative_error / 24.0); // the sphere is made of triangles
+                return Eigen::ArrayXf::Map(picture.image.rgb.data(), 3 * 24 * 24).cast<double>().mean();
+            };
+            const std::string what = std::to_string(degrees) + " degrees, " + strategy_name(strategy);
+            double error = 0.0;
+            const double exact = 2.0 * 0.5 / (1.0 - 0.5) * 0.5 * (1.0 + cosine);
+            const double indirect = mean(Layer::irradiance, error);
+            expect_equal_within_noise(indirect, exact, error * exact, what);
+            const double direct = mean(Layer::direct, error);
+            EXPECT_NEAR(direct, 0.5 / pi * 2.0 * cosine, 0.005 * direct) << what;
+        }
+    }
+}
+
+TEST(PathTracer, ANormalMapShowsNoLightFromBelowTheSurface) {
+    // A ground, a roof without holes over half of it, and a light that shines on the ground beside: the
+    // roof's upper side looks down at what is lit, but for its own plane.
+    Scene scene = sphere_with_tilted_normals(60.0);
+    scene.normals.clear(), scene.normal_indices.clear();
+    scene.positions = {{0, 0, 0}, {4, 0, 0}, {4, 0, 4}, {0, 0, 4}, {-2, 1, 0}, {0, 1, 0}, {0, 1, 4}, {-2, 1, 4}};
+    scene.triangles = {{2, 1, 0}, {3, 2, 0}, {6, 5, 4}, {7, 6, 4}};
+    scene.material_index.assign(4, 0);
+    scene.texture_coordinates = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    scene.texture_indices = {{2, 1, 0}, {3, 2, 0}, {2, 1, 0}, {3, 2, 0}}; // u along x
+    const Surface surface(scene);
+    const Spotlight light = hard_spot(Vec3(2, 0.5f, 2), -Vec3::UnitY(), 60.0f);
+    Camera camera{.position = Vec3(-1, 3, 2), .target = Vec3(-1, 1, 2), .up = Vec3::UnitX(), .vertical_fov = 20.0f, .width = 8, .height = 8};
+    camera.check();
+    const Hit hit = surface.closest_hit({camera.position, -Vec3::UnitY()});
+    ASSERT_GT(surface.shown_normal(hit, surface.point(hit)).dot(Vec3(3, -1, 0).normalized()), 0.1f);
+    for (const PathStrategy strategy : {PathStrategy::plain, PathStrategy::connected}) {
+        const PictureEstimate full = render_reference(surface, light, camera, Layer::full, {.samples = 256, .seed = 2, .strategy = strategy});
+        EXPECT_EQ(*std::max_element(full.image.rgb.begin(), full.image.rgb.end()), 0.0f);
+    }
+}
+
 TEST(PathTracer, APictureOfAFurnaceIsItsClosedForm) {
     const Scene scene = make_builtin_scene("builtin:sphere:0.5");
     const Surface surface(scene);
