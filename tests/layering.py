@@ -13,8 +13,8 @@ FOLDERS = {
     "transport": {"core", "basis", "transport"},
     "viewer": {"core", "basis", "transport", "viewer"},
 }
-ANYWHERE = r"Eigen/|[a-z_]+$|sys/\w+\.h$|(fcntl|immintrin|unistd)\.h$"  # and the standard library
-LIBRARIES = {  # how the included path starts -> the .cpp files, or folders of them, that may name it
+ANYWHERE = r"Eigen/|[a-z_]+$|sys/\w+\.h$|(fcntl|immintrin|spawn|unistd)\.h$"  # and the standard library
+LIBRARIES = {  # how the included path starts -> the files, or folders' .cpp files, that may name it
     r"embree3/": {"core/surface.cpp"},
     r"OpenEXR/|Imf|Imath|Iex|half\.h": {"core/image.cpp"},
     r"stb/|stb_": {"core/image.cpp", "core/obj_loader.cpp"},
@@ -24,7 +24,8 @@ LIBRARIES = {  # how the included path starts -> the .cpp files, or folders of t
     r"xxhash": {"core/file.cpp", "transport/safetensors.cpp"},
     r"nlohmann/": {"transport/", "viewer/"},
     r"CLI/": {"transport/", "viewer/"},
-    r"(GL|GLES\d?|EGL|GLFW|glad|epoxy)/": {"viewer/"},
+    r"(GL|EGL|GLFW)/": {"viewer/", "viewer/gl.h"},
+    r"imgui\.h|backends/imgui_": {"viewer/"},
 }
 
 
@@ -45,7 +46,8 @@ def is_allowed(name, folders, quote, path):
         return path.split("/")[0] in folders
     for library, files in LIBRARIES.items():
         if re.match(library, path):
-            return name.endswith(".cpp") and any(name.startswith(file) for file in files)
+            return name in files or (
+                name.endswith(".cpp") and any(name.startswith(file) for file in files))
     return re.match(ANYWHERE, path) is not None
 
 

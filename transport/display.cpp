@@ -15,7 +15,8 @@ Display::Display(const TransferOperator& transfer, const Surface& surface)
              transfer.kind == OperatorKind::neumann ? std::optional(transfer.points.levels() - 1)
                                                     : std::nullopt) {}
 
-Rgb Display::net_irradiance(const SurfacePoint& x, const VectorIrradiance& field, bool& covered) const {
+Rgb Display::net_irradiance(const SurfacePoint& x, const Vec3& normal,
+                            const VectorIrradiance& field, bool& covered) const {
     thread_local std::vector<BasisEntry> row;
     row.clear();
     const int last = transfer_.points.levels() - 1;
@@ -29,7 +30,7 @@ Rgb Display::net_irradiance(const SurfacePoint& x, const VectorIrradiance& field
     for (const BasisEntry& entry : row) {
         const float* v = &field[9 * static_cast<std::size_t>(entry.index)];
         for (int c = 0; c < 3; ++c)
-            sum[c] += entry.value * (x.normal.x() * v[c] + x.normal.y() * v[3 + c] + x.normal.z() * v[6 + c]);
+            sum[c] += entry.value * (normal.x() * v[c] + normal.y() * v[3 + c] + normal.z() * v[6 + c]);
     }
     return sum;
 }

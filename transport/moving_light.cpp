@@ -1,6 +1,7 @@
 #include "transport/moving_light.h"
 
 #include "core/parallel.h"
+#include "transport/positivity.h"
 
 #include <algorithm>
 #include <chrono>
@@ -180,7 +181,9 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
         const double norm_before = field_norm_;
         follow_round(direct, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
-        push_field(transport_.transfer().points.levels());
+        const TransferOperator& transfer = transport_.transfer();
+        push_field(transfer.points.levels());
+        make_positive(transfer.points, transfer.push, field_);
         field_norm_ = display_norm();
         // What was small beside the field as it was may not be beside a darker one.
         if (field_norm_ < 0.9 * norm_before) s.settled = s.anew;

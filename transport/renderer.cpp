@@ -19,10 +19,11 @@ struct Shader {
 
     Rgb operator()(const Hit& hit, bool& covered) const {
         const SurfacePoint x = surface.point(hit);
+        const Vec3 shown = surface.shown_normal(hit, x);
         Rgb irradiance = Rgb::Zero();
         if (layer == Layer::direct || layer == Layer::full)
-            irradiance += direct_irradiance(surface, light, x);
-        if (layer != Layer::direct) irradiance += display.irradiance(x, field, covered);
+            irradiance += direct_irradiance(surface, light, x, shown);
+        if (layer != Layer::direct) irradiance += display.irradiance(x, shown, field, covered);
         if (layer == Layer::irradiance) return irradiance;
         return surface.reflectance(hit) / static_cast<float>(EIGEN_PI) * irradiance;
     }

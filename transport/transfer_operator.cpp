@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "transport/krylov.h"
+#include "transport/positivity.h"
 
 #include <algorithm>
 
@@ -108,7 +109,9 @@ Radiosity LightTransport::some_bounces(const Radiosity& direct, int count) const
 }
 
 VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
-    return apply_links(coefficients(radiosity), transfer_.points.levels());
+    VectorIrradiance field = apply_links(coefficients(radiosity), transfer_.points.levels());
+    make_positive(transfer_.points, transfer_.push, field);
+    return field;
 }
 
 /// S e, where e are the coefficients of direct irradiance.

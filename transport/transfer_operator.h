@@ -90,7 +90,8 @@ public:
     /// The first `count` terms of that sum, one product each but the first.
     Radiosity some_bounces(const Radiosity& direct, int count) const;
 
-    /// T e pushed to every receiver: indirect vector irradiance at all points.
+    /// T e pushed to every receiver: indirect vector irradiance at all points, nowhere on the display
+    /// level below zero (make_positive()).
     VectorIrradiance gather(const Radiosity& radiosity) const;
 
     /// Indirect vector irradiance at all points under a light, after as many bounces as the operator

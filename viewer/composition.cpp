@@ -90,7 +90,7 @@ void Composition::draw(const GeometryBuffer& pixels, GLuint direct, GLuint indir
     gl_.Viewport(0, 0, width, height);
     layer_program_.use();
     layer_program_.bind("surfaces", 0, GL_TEXTURE_2D, pixels.surface());
-    layer_program_.bind("normals", 1, GL_TEXTURE_2D, pixels.normal());
+    layer_program_.bind("normals", 1, GL_TEXTURE_2D, pixels.shown_normal());
     layer_program_.bind("reflectances", 2, GL_TEXTURE_2D, pixels.reflectance());
     layer_program_.bind("direct", 3, GL_TEXTURE_2D, direct);
     layer_program_.bind("indirect", 4, GL_TEXTURE_2D, indirect);

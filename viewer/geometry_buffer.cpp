@@ -38,10 +38,30 @@ uniform samplerBuffer triangles;
 uniform vec3 reflectance;
 uniform bool is_textured;
 uniform sampler2D image;
+uniform bool has_normal_map;
+uniform sampler2D normal_map;
+uniform samplerBuffer tangents;
 out vec4 out_position;
 out vec4 out_normal;
 out vec4 out_reflectance;
 out uint out_surface;
+out vec4 out_shown;
+
+// As mapped_normal().
+vec3 mapped_normal(vec3 mapped, vec4 tangent, vec3 normal, vec3 geometric, float side) {
+    vec3 front = side * normal;
+    vec3 along = tangent.xyz - dot(front, tangent.xyz) * front;
+    float size = length(along);
+    if (size < 1e-3) return normal;
+    vec3 u = along / size, v = tangent.w * cross(front, u);
+    vec3 turned = side * (mapped.x * u + mapped.y * v + mapped.z * front);
+    float turned_size = length(turned);
+    if (turned_size < 1e-3) return normal;
+    vec3 n = turned / turned_size;
+    float height = dot(n, geometric);
+    return height >= 0.01 ? n : normalize(n + (0.01 - height) * geometric);
+}
+
 void main() {
     uint triangle = first_triangle + uint(gl_PrimitiveID);
     vec3 geometric = texelFetch(triangles, int(triangle)).xyz;
@@ -57,6 +77,12 @@ void main() {
     vec3 place_on_plane = eye + dot(from_eye, geometric) / slope * direction;
     out_position = vec4(abs(slope) > 1e-5 ? place_on_plane : x, 1.0);
     out_normal = vec4(n, 0.0);
+    out_shown = out_normal;
+    if (has_normal_map) {
+        vec4 tangent = texelFetch(tangents, int(triangle));
+        if (tangent.xyz != vec3(0.0))
+            out_shown.xyz = mapped_normal(texture(normal_map, place).xyz, tangent, n, geometric, side);
+    }
     out_reflectance = vec4(reflectance, 1.0);
     if (is_textured) out_reflectance.rgb *= texture(image, place).rgb;
     out_surface = 2u * triangle + (back_side ? 1u : 0u);
@@ -81,20 +107,23 @@ Eigen::Matrix3f pixel_rays(const Camera& camera, const Vec2& shift) {
 
 } // namespace
 
-GeometryBuffer::Targets::Targets(const Gl& gl, int w, int h)
+GeometryBuffer::Targets::Targets(const Gl& gl, int w, int h, bool with_shown)
     : width(w), height(h), position(make_texture(gl, float4_texels, w, h)),
       normal(make_texture(gl, float4_texels, w, h)),
       reflectance(make_texture(gl, half4_texels, w, h)),
       surface(make_texture(gl, index_texels, w, h)), depth(make_texture(gl, depth_texels, w, h)),
-      framebuffer(make_framebuffer(gl, {position, normal, reflectance, surface}, depth)) {}
+      shown(with_shown ? make_texture(gl, float4_texels, w, h) : GlName()),
+      framebuffer(with_shown
+                      ? make_framebuffer(gl, {position, normal, reflectance, surface, shown}, depth)
+                      : make_framebuffer(gl, {position, normal, reflectance, surface}, depth)) {}
 
 GeometryBuffer::GeometryBuffer(const Gl& gl)
     : gl_(gl), program_(gl, "geometry", vertex_shader, fragment_shader, {"position", "normal", "uv"},
-                        {"out_position", "out_normal", "out_reflectance", "out_surface"}) {}
+                        {"out_position", "out_normal", "out_reflectance", "out_surface", "out_shown"}) {}
 
 void GeometryBuffer::draw(const SceneMesh& mesh, const Camera& camera, const Vec2& place) {
     if (!targets_ || targets_->width != camera.width || targets_->height != camera.height)
-        targets_.emplace(gl_, camera.width, camera.height);
+        targets_.emplace(gl_, camera.width, camera.height, mesh.has_normal_maps());
     camera_ = camera;
     const bool reversed = gl_.ClipControl != nullptr;
     ViewTransform view = view_transform(camera, mesh.farthest(camera.position), reversed);
@@ -114,6 +143,7 @@ void GeometryBuffer::draw(const SceneMesh& mesh, const Camera& camera, const Vec
     const float farthest = reversed ? 0.0f : 1.0f;
     for (int target = 0; target < 3; ++target) gl_.ClearBufferfv(GL_COLOR, target, nothing.data());
     gl_.ClearBufferuiv(GL_COLOR, 3, no_surface.data());
+    if (targets_->shown != 0) gl_.ClearBufferfv(GL_COLOR, 4, nothing.data());
     gl_.ClearBufferfv(GL_DEPTH, 0, &farthest);
 
     program_.use();
@@ -139,6 +169,10 @@ const PixelSurfaces& GeometryBuffer::read() {
     read_target(GL_COLOR_ATTACHMENT0, float4_texels, positions_.data());
     read_target(GL_COLOR_ATTACHMENT1, float4_texels, normals_.data());
     read_target(GL_COLOR_ATTACHMENT3, index_texels, surfaces_.data());
+    if (targets_->shown != 0) {
+        shown_.resize(size);
+        read_target(GL_COLOR_ATTACHMENT4, float4_texels, shown_.data());
+    }
     const float half = std::tan(camera_.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
     pixels_ = {targets_->width,  targets_->height, camera_.position,
                2.0f * half / static_cast<float>(targets_->height), positions_, normals_, surfaces_};

@@ -24,23 +24,29 @@ public:
     // nothing is.
     GLuint position() const { return targets_->position; }
     GLuint normal() const { return targets_->normal; }
+    /// With which light is shown, as Surface::shown_normal has it; the same texture without normal maps.
+    GLuint shown_normal() const { return targets_->shown != 0 ? targets_->shown : targets_->normal; }
     GLuint reflectance() const { return targets_->reflectance; }
     GLuint surface() const { return targets_->surface; }
 
     /// The pixels on the CPU, until the next call.
     const PixelSurfaces& read();
+    /// Of the pixels last read.
+    std::span<const PixelSurfaces::Float4> shown_normals() const {
+        return shown_.empty() ? normals_ : shown_;
+    }
 
 private:
     struct Targets {
         int width, height;
-        GlName position, normal, reflectance, surface, depth, framebuffer;
-        Targets(const Gl& gl, int w, int h);
+        GlName position, normal, reflectance, surface, depth, shown, framebuffer;
+        Targets(const Gl& gl, int w, int h, bool with_shown);
     };
     const Gl& gl_;
     GlProgram program_;
     std::optional<Targets> targets_;
     Camera camera_;
-    std::vector<PixelSurfaces::Float4> positions_, normals_;
+    std::vector<PixelSurfaces::Float4> positions_, normals_, shown_; // the last: empty without maps
     std::vector<std::uint32_t> surfaces_;
     PixelSurfaces pixels_;
 };

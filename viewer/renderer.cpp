@@ -167,7 +167,7 @@ void Renderer::splat() {
 
 void Renderer::gather() {
     gathered_.resize(patch_.size());
-    field_->irradiance(pixels(), patches_, patch_, pixels().normal, gathered_);
+    field_->irradiance(pixels(), patches_, patch_, geometry_.shown_normals(), gathered_);
     gl_.BindTexture(GL_TEXTURE_2D, targets_->indirect);
     gl_.TexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, targets_->width, targets_->height, float4_texels.format,
                       float4_texels.type, gathered_.data());

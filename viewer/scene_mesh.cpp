@@ -1,5 +1,7 @@
 #include "viewer/scene_mesh.h"
 
+#include "core/normal_map.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -49,7 +51,7 @@ Vec3 normal_of(const Scene& scene, std::uint32_t t) {
 
 SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
     : gl_(gl), bounds_(scene.bounds()), vertices_(make_buffer(gl)),
-      vertex_array_(make_vertex_array(gl)), triangles_(gl, GL_RGBA32F, 16) {
+      vertex_array_(make_vertex_array(gl)), triangles_(gl, GL_RGBA32F, 16), tangents_(gl, GL_RGBA32F, 16) {
     // By material; within one as they come, which mostly is object by object.
     order_.resize(scene.triangles.size());
     std::iota(order_.begin(), order_.end(), 0u);
@@ -68,7 +70,8 @@ SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
         if (k == 0 || kind(t) != kind(order_[k - 1]) || pieces_.back().count == most_in_a_piece) {
             const Material& material = scene.materials[scene.material_index[t]];
             pieces_.push_back({k, 0, material.reflectance,
-                               has_uv(scene, t) ? material.texture : no_index, {}});
+                               has_uv(scene, t) ? material.texture : no_index,
+                               has_uv(scene, t) ? material.normal_map : no_index, {}});
         }
         ++pieces_.back().count;
         for (int corner = 0; corner < 3; ++corner) {
@@ -91,12 +94,21 @@ SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
     attribute(0, 3, GL_FLOAT, GL_FALSE, offsetof(Vertex, position));
     attribute(1, 3, GL_SHORT, GL_TRUE, offsetof(Vertex, normal));
     attribute(2, 2, GL_FLOAT, GL_FALSE, offsetof(Vertex, uv));
-    upload_textures(scene);
+    textures_ = upload(scene.textures);
+    normal_maps_ = upload(scene.normal_maps);
+    if (!has_normal_maps()) return;
+    std::vector<Eigen::Vector4f> tangents;
+    for (const std::uint32_t t : order_) {
+        const Tangent tangent = tangent_of(scene, t);
+        tangents.emplace_back(tangent.direction.x(), tangent.direction.y(), tangent.direction.z(), tangent.sign);
+    }
+    tangents_.set(tangents.data(), tangents.size());
 }
 
-void SceneMesh::upload_textures(const Scene& scene) {
-    for (const Texture& texture : scene.textures) {
-        textures_.push_back(make_texture(gl_, {GL_RGB16F, GL_RGB, GL_FLOAT}, texture.width,
+std::vector<GlName> SceneMesh::upload(const std::vector<Texture>& textures) const {
+    std::vector<GlName> names;
+    for (const Texture& texture : textures) {
+        names.push_back(make_texture(gl_, {GL_RGB16F, GL_RGB, GL_FLOAT}, texture.width,
                                          texture.height, texture.rgb.data()));
         // As Texture::sample: bilinear, repeated. Row 0 is at v = 0 in both.
         gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
@@ -104,6 +116,7 @@ void SceneMesh::upload_textures(const Scene& scene) {
         gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_REPEAT);
         gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_REPEAT);
     }
+    return names;
 }
 
 float SceneMesh::farthest(const Vec3& from) const {
@@ -120,6 +133,8 @@ void SceneMesh::draw(const GlProgram& program, const ViewTransform& view, bool s
     if (shaded) {
         program.bind("triangles", 0, GL_TEXTURE_BUFFER, triangles_.texture());
         program.set("image", 1);
+        program.set("normal_map", 2);
+        program.bind("tangents", 3, GL_TEXTURE_BUFFER, tangents_.texture());
     }
     for (const auto& [distance, piece] : seen) {
         if (shaded) {
@@ -128,6 +143,9 @@ void SceneMesh::draw(const GlProgram& program, const ViewTransform& view, bool s
             program.set("is_textured", piece->texture != no_index ? 1 : 0);
             if (piece->texture != no_index)
                 program.bind("image", 1, GL_TEXTURE_2D, textures_[piece->texture]);
+            program.set("has_normal_map", piece->normal_map != no_index ? 1 : 0);
+            if (piece->normal_map != no_index)
+                program.bind("normal_map", 2, GL_TEXTURE_2D, normal_maps_[piece->normal_map]);
         }
         gl_.DrawArrays(GL_TRIANGLES, static_cast<GLint>(3 * piece->first),
                        static_cast<GLsizei>(3 * piece->count));

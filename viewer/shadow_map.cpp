@@ -34,6 +34,7 @@ void main() { distance_from_light = length(from_light); }
 const char* const shade_fragment_shader = R"(
 uniform sampler2D positions;
 uniform sampler2D normals;
+uniform sampler2D shown_normals;
 uniform usampler2D surfaces;
 uniform samplerBuffer triangles;
 uniform sampler2DArray distances;
@@ -94,7 +95,8 @@ void main() {
     float squared = dot(from_light, from_light);
     if (squared == 0.0) return;
     vec3 direction = from_light * inversesqrt(squared);
-    float cos_surface = -dot(direction, texelFetch(normals, pixel, 0).xyz);
+    float cos_surface = -dot(direction, texelFetch(shown_normals, pixel, 0).xyz);
+    if (dot(direction, texelFetch(normals, pixel, 0).xyz) >= 0.0) return;
     float share = falloff(dot(direction, light_direction));
     if (cos_surface <= 0.0 || share == 0.0) return;
     // The plane that is lit, on the viewer's side: seen from behind, it shadows itself.
@@ -195,6 +197,7 @@ void ShadowMap::shade(const SceneMesh& mesh, const GeometryBuffer& pixels, GLuin
     p.bind("normals", 1, GL_TEXTURE_2D, pixels.normal());
     p.bind("surfaces", 2, GL_TEXTURE_2D, pixels.surface());
     p.bind("triangles", 3, GL_TEXTURE_BUFFER, mesh.triangle_normals());
+    p.bind("shown_normals", 5, GL_TEXTURE_2D, pixels.shown_normal());
     p.bind("distances", 4, GL_TEXTURE_2D_ARRAY, distances_);
     p.set("face_count", static_cast<int>(faces_.size()));
     for (std::size_t k = 0; k < faces_.size(); ++k) {

@@ -52,6 +52,7 @@ void main() {
 const std::string add_fragment_shader = functions_in_shaders + R"(
 uniform sampler2D positions;
 uniform sampler2D normals;
+uniform sampler2D shown_normals;
 uniform usampler2D patches;
 uniform usamplerBuffer row_begin;
 uniform usamplerBuffer row_entries; // (function, bits of its factor), functions rising
@@ -87,7 +88,7 @@ void main() {
         if ((power & 1) == 1) w *= cosine;
         cosine *= cosine;
     }
-    sum = w * vec4(f.vector_irradiance * n, 1.0);
+    sum = w * vec4(f.vector_irradiance * texelFetch(shown_normals, pixel, 0).xyz, 1.0);
 }
 )";
 
@@ -95,6 +96,7 @@ const std::string divide_fragment_shader = functions_in_shaders + R"(
 uniform sampler2D sums;
 uniform sampler2D positions;
 uniform sampler2D normals;
+uniform sampler2D shown_normals;
 uniform usampler2D patches;
 uniform usamplerBuffer row_begin;
 uniform usamplerBuffer row_entries;
@@ -119,7 +121,7 @@ void main() {
         float d2 = relative_distance2(f, x);
         if (d2 >= least) continue;
         least = d2;
-        irradiance = vec4(max(f.vector_irradiance * texelFetch(normals, pixel, 0).xyz, 0.0), 1.0);
+        irradiance = vec4(max(f.vector_irradiance * texelFetch(shown_normals, pixel, 0).xyz, 0.0), 1.0);
     }
 }
 )";
@@ -184,6 +186,7 @@ void Splatter::draw(const GeometryBuffer& pixels, const Camera& camera, const Di
         p.bind("functions", 0, GL_TEXTURE_BUFFER, functions_.texture());
         p.bind("positions", 1, GL_TEXTURE_2D, pixels.position());
         p.bind("normals", 2, GL_TEXTURE_2D, pixels.normal());
+        p.bind("shown_normals", 7, GL_TEXTURE_2D, pixels.shown_normal());
         p.bind("patches", 3, GL_TEXTURE_2D, targets_->patch);
         p.bind("row_begin", 4, GL_TEXTURE_BUFFER, row_begin_.texture());
         p.bind("row_entries", 5, GL_TEXTURE_BUFFER, row_entries_.texture());

@@ -119,6 +119,12 @@ std::vector<Figure> near_wall(double distance, const Vec3& direction) {
 
 // Motion.
 
+std::vector<Figure> flicker_figures(const Flicker& f) {
+    return {percent("rms beyond", f.net_rms()), percent("p95 beyond", f.p95),
+            percent("largest beyond", f.largest), percent("reference noise", f.noise),
+            percent("true change", f.change), {"largest jump over the true one", f.jump_ratio}};
+}
+
 /// Six frames of a light that moves by so many spacings of the finest senders a frame.
 std::vector<Figure> flicker(double step) {
     constexpr int count = 6;
@@ -138,9 +144,7 @@ std::vector<Figure> flicker(double step) {
                         .width = 96,
                         .height = 64};
     const Flicker f = measure_flicker(room.surface(), room.transfer(), frames, camera);
-    return {percent("rms beyond", f.net_rms()), percent("p95 beyond", f.p95),
-            percent("largest beyond", f.largest), percent("reference noise", f.noise),
-            percent("true change", f.change)};
+    return flicker_figures(f);
 }
 
 // Bright scenes.
@@ -190,6 +194,25 @@ std::vector<Figure> bright_sponza(double mean) {
     return figures;
 }
 
+/// The light of Sponza walks along the nave for 200 frames, so many metres a frame.
+std::vector<Figure> walk_sponza(double step) {
+    const AccuracyScene described =
+        find_accuracy_scene("sponza", std::getenv("AFTERGLOW_SCENES"), AFTERGLOW_LIGHTS);
+    const Prepared sponza(load_scene(described.path), described.viewpoint, 400);
+    std::vector<Spotlight> frames(200, described.lights[0]);
+    for (std::size_t f = 0; f < frames.size(); ++f)
+        frames[f].position.x() += static_cast<float>(step) * static_cast<float>(f);
+    const Camera camera{.position = Vec3(-10.0f, 2.0f, 0.0f),
+                        .target = Vec3(-9.0f, 1.9f, 0.0f),
+                        .up = Vec3::UnitY(),
+                        .vertical_fov = 45.0f,
+                        .width = 96,
+                        .height = 64};
+    const Precomputed& precomputed = sponza.precomputed;
+    return flicker_figures(measure_flicker(precomputed.surface(), precomputed.transfer(), frames, camera,
+                                           {.runs = 4, .samples_per_run = 8}));
+}
+
 } // namespace
 
 std::vector<Family> light_families() {
@@ -231,9 +254,11 @@ std::vector<Family> light_families() {
          {0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1},
          [](double distance) { return near_wall(distance, Vec3::UnitX()); }},
         {"flicker", "step of a light [spacings of the finest senders]", {0.1, 0.3, 1, 3}, flicker}};
-    if (std::getenv("AFTERGLOW_SCENES"))
+    if (std::getenv("AFTERGLOW_SCENES")) {
         families.push_back(
             {"bright_sponza", "mean reflectance", {0.25, 0.5, 0.9, 0.99}, bright_sponza});
+        families.push_back({"walk_sponza", "step of a light [m]", {0.01}, walk_sponza});
+    }
     return families;
 }
 

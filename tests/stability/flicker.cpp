@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "transport/display.h"
+#include "transport/moving_light.h"
 
 #include <algorithm>
 #include <cmath>
@@ -66,9 +67,10 @@ Flicker measure_flicker(const Surface& surface, const TransferOperator& transfer
 
     Eigen::ArrayXXd ours(pixels.blocks(), frame_count);
     const LightTransport transport(transfer, surface);
+    MovingLight moving(transport, {});
     const Display display(transfer, surface);
     for (Index f = 0; f < frame_count; ++f) {
-        const VectorIrradiance field = transport.indirect(frames[static_cast<std::size_t>(f)]);
+        const VectorIrradiance& field = moving.follow(frames[static_cast<std::size_t>(f)]);
         const Eigen::Array3Xf irradiance = display.irradiance(pixels.at, field);
         ours.col(f) = pixels.block_means([&](Index k) -> Rgb { return irradiance.col(k); });
     }
@@ -99,8 +101,11 @@ Flicker measure_flicker(const Surface& surface, const TransferOperator& transfer
     for (const double b : beyond.reshaped())
         sizes.push_back(std::abs(b));
     std::ranges::sort(sizes);
+    const Eigen::ArrayXd our_jumps = changes(ours).abs().rowwise().maxCoeff();
+    const Eigen::ArrayXd true_jumps = true_change.abs().rowwise().maxCoeff();
     return {std::sqrt(beyond.square().mean()), sizes[(sizes.size() * 95 - 1) / 100], sizes.back(),
-            std::sqrt(variance), std::sqrt((true_change.colwise() / unit).square().mean())};
+            std::sqrt(variance), std::sqrt((true_change.colwise() / unit).square().mean()),
+            (our_jumps / true_jumps).maxCoeff()};
 }
 
 } // namespace afterglow

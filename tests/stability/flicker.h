@@ -8,8 +8,8 @@
 
 namespace afterglow {
 
-/// How much more a picture changes from frame to frame, under a light that moves, than the truth
-/// does. Looked at are the means of indirect radiance over blocks of 16 x 16 pixels; a change of a
+/// How much more a picture changes from frame to frame, under a light that moves and that MovingLight
+/// follows, than the truth does. Looked at are the means of indirect radiance over blocks of 16 x 16 pixels; a change of a
 /// block is relative to the block's true mean over the frames.
 struct Flicker {
     double rms = 0.0;     // of the change beyond the reference's, over blocks and frames
@@ -17,6 +17,7 @@ struct Flicker {
     double largest = 0.0; // of its sizes
     double noise = 0.0;   // root mean square standard error of the reference's changes
     double change = 0.0;  // rms of the reference's own changes
+    double jump_ratio = 0.0; // largest change of a block over the reference's largest, worst block
     /// Root mean square without the reference's noise.
     double net_rms() const;
 };

@@ -175,6 +175,59 @@ TEST_P(OnContext, PixelsShowWhatRaysHit) {
         }
 }
 
+/// A room of 4 m with waves in the normals of its floor and a bumpy wall, as an OBJ file.
+std::string bumpy_room() {
+    static const TemporaryFolder folder;
+    std::vector<unsigned char> waves, bumps;
+    for (int y = 0; y < 32; ++y)
+        for (int x = 0; x < 32; ++x) {
+            const double angle = 0.6 * std::sin(x * 0.4);
+            for (const double c : {std::sin(angle), 0.0, std::cos(angle)})
+                waves.push_back(static_cast<unsigned char>(std::lround(128.0 + 127.0 * c)));
+            for (int c = 0; c < 3; ++c) bumps.push_back(static_cast<unsigned char>(128 + 100 * std::sin(x * 0.8) * std::cos(y * 0.8)));
+        }
+    write_png_bytes(folder.path("waves.png"), 32, 32, waves);
+    write_png_bytes(folder.path("bumps.png"), 32, 32, bumps);
+    folder.write("room.mtl", "newmtl floor\nKd 0.6 0.5 0.4\nnorm waves.png\n"
+                             "newmtl wall\nKd 0.5 0.5 0.6\nmap_Bump -bm 2 bumps.png\nnewmtl plain\nKd 0.6 0.6 0.6\n");
+    return folder.write("room.obj",
+        "mtllib room.mtl\nv 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 0 3 0\nv 4 3 0\nv 4 3 4\nv 0 3 4\n"
+        "vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nusemtl floor\nf 1/1 4/4 3/3 2/2\nusemtl wall\nf 1/1 2/2 6/3 5/4\n"
+        "usemtl plain\nf 5 6 7 8\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+}
+
+TEST_P(OnContext, NormalMapsAreThoseOfTheRendererOnTheCpu) {
+    const TransferScene& scene = opened(bumpy_room());
+    ASSERT_EQ(scene.scene.normal_maps.size(), 2u);
+    const Camera camera{.position = {3.5f, 2.0f, 3.5f}, .target = {1.5f, 0.5f, 0.5f}, .vertical_fov = 60.0f, .width = 240, .height = 180};
+    Spotlight light{.position = {2.0f, 2.5f, 2.5f}, .direction = {-0.2f, -1.0f, -0.5f}, .inner_angle = 30.0f, .outer_angle = 50.0f};
+    light.check();
+    const VectorIrradiance field = scene.transport.indirect(light);
+    auto lit = std::make_shared<DisplayField>(scene.file.transfer.points);
+    lit->set(field);
+    Renderer renderer(context->gl(), scene, IndirectMethod::gather);
+    renderer.set_light(light, lit);
+    const auto expected = [&](Layer layer) {
+        return render_picture(scene.surface, scene.display, field, light, camera, layer, 1).image;
+    };
+    const auto drawn = [&](ViewLayer layer) {
+        renderer.draw(camera, layer);
+        return renderer.read();
+    };
+    const Image gathered = drawn(ViewLayer::indirect), direct = drawn(ViewLayer::direct);
+    const std::vector<bool> other = other_surfaces(scene, renderer, camera);
+    EXPECT_LT(difference(gathered, expected(Layer::indirect), other), 0.005);
+    EXPECT_LT(difference(direct, expected(Layer::direct), other), 0.02);
+    renderer.set_method(IndirectMethod::splat);
+    EXPECT_LT(difference(drawn(ViewLayer::indirect), gathered), 1e-4);
+    // The maps are seen: without them the picture is another one.
+    Scene flat = scene.scene;
+    for (Material& material : flat.materials) material.normal_map = no_index;
+    const Surface flat_surface(flat);
+    const Display flat_display(scene.file.transfer, flat_surface);
+    EXPECT_GT(difference(gathered, render_picture(flat_surface, flat_display, field, light, camera, Layer::indirect, 1).image), 0.05);
+}
+
 TEST_P(OnContext, APictureGetsBetterWhileItIsDrawnAgain) {
     const TransferScene& scene = opened(cornell);
     LightSolver solver(scene, 0);
