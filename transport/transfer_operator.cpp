@@ -109,9 +109,7 @@ Radiosity LightTransport::some_bounces(const Radiosity& direct, int count) const
 }
 
 VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
-    VectorIrradiance field = apply_links(coefficients(radiosity), transfer_.points.levels());
-    make_positive(transfer_.points, transfer_.push, field);
-    return field;
+    return apply_links(coefficients(radiosity), transfer_.points.levels());
 }
 
 /// S e, where e are the coefficients of direct irradiance.
@@ -148,9 +146,16 @@ VectorIrradiance LightTransport::indirect(const Spotlight& light,
         return apply_paper(e);
     }
     const Radiosity direct = direct_radiosity(light);
-    if (transfer_.bounces == 0) return gather(all_bounces(direct, 2e-3, statistics));
-    if (statistics) *statistics = {.products = transfer_.bounces - 1};
-    return gather(some_bounces(direct, transfer_.bounces));
+    Radiosity sum;
+    if (transfer_.bounces == 0) {
+        sum = all_bounces(direct, 2e-3, statistics);
+    } else {
+        sum = some_bounces(direct, transfer_.bounces);
+        if (statistics) *statistics = {.products = transfer_.bounces - 1};
+    }
+    VectorIrradiance field = gather(sum);
+    make_positive(transfer_.points, transfer_.push, field);
+    return field;
 }
 
 } // namespace afterglow

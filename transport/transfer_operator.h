@@ -90,12 +90,11 @@ public:
     /// The first `count` terms of that sum, one product each but the first.
     Radiosity some_bounces(const Radiosity& direct, int count) const;
 
-    /// T e pushed to every receiver: indirect vector irradiance at all points, nowhere on the display
-    /// level below zero (make_positive()).
+    /// T e pushed to every receiver: indirect vector irradiance at all points. Linear.
     VectorIrradiance gather(const Radiosity& radiosity) const;
 
     /// Indirect vector irradiance at all points under a light, after as many bounces as the operator
-    /// says.
+    /// says. Of `neumann` it is nowhere below zero on the display level (make_positive()).
     VectorIrradiance indirect(const Spotlight& light, NeumannStatistics* statistics = nullptr) const;
 
 private:
