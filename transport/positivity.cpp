@@ -53,30 +53,37 @@ void make_positive(const PointHierarchy& points, const PushOperator& push, Vecto
             wants[index[e]] = 1;
         }
     }
-    const auto concerned = [&](Index j) {
-        const auto index = push.parents.indices(j);
-        return std::any_of(index.begin(), index.end(), [&](std::uint32_t p) { return wants[p] != 0; });
-    };
+    // Whose irradiance changes: found in parallel, added up in order.
+    std::vector<std::uint8_t> changes(is_negative);
+    parallel_for(count, [&](Index k) {
+        const auto index = push.parents.indices(first + k);
+        changes[static_cast<std::size_t>(k)] |= std::any_of(
+            index.begin(), index.end(), [&](std::uint32_t parent) { return wants[parent] != 0; });
+    }, 4096);
     std::vector<Rgb> there(static_cast<std::size_t>(parents), Rgb::Zero());
     std::vector<Index> list;
-    for (Index j = first; j < first + count; ++j) {
-        const bool negative = is_negative[static_cast<std::size_t>(j - first)];
-        if (!negative && !concerned(j)) continue;
+    for (Index k = 0; k < count; ++k) {
+        if (!changes[static_cast<std::size_t>(k)]) continue;
+        const Index j = first + k;
         list.push_back(j);
         const Rgb above = display.irradiance(j).max(0.0f);
         const auto index = push.parents.indices(j);
         const auto weight = push.parents.values(j);
         for (std::size_t e = 0; e < index.size(); ++e) there[index[e]] += weight[e] * above;
     }
+    // What each parent's points lose of their irradiance, as a share.
+    parallel_for(parents, [&](Index k) {
+        Rgb& share = missing[static_cast<std::size_t>(k)];
+        const Rgb& above = there[static_cast<std::size_t>(k)];
+        if (wants[static_cast<std::size_t>(k)])
+            share = (above > 0.0f).select(share / above.max(1e-30f), Rgb::Zero());
+    }, 4096);
     parallel_for(static_cast<Index>(list.size()), [&](Index k) {
         const Index j = list[static_cast<std::size_t>(k)];
         const auto index = push.parents.indices(j);
         const auto weight = push.parents.values(j);
         Rgb taken = Rgb::Zero();
-        for (std::size_t e = 0; e < index.size(); ++e) {
-            const Rgb &d = missing[index[e]], &p = there[index[e]];
-            taken += weight[e] * (p > 0.0f).select(d / p.max(1e-30f), Rgb::Zero());
-        }
+        for (std::size_t e = 0; e < index.size(); ++e) taken += weight[e] * missing[index[e]];
         const Rgb e = display.irradiance(j);
         display.add(j, e.max(0.0f) * (1.0f - taken.min(1.0f)) - e);
         // Rounding may leave a hair below zero.
