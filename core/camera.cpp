@@ -30,15 +30,15 @@ void Camera::check() const {
         throw UsageError("camera: up is zero or points along the view; choose another up");
 }
 
+float Camera::half_height() const {
+    return std::tan(vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+}
+
 Vec3 Camera::direction(float x, float y) const {
-    const Vec3 forward = (target - position).stableNormalized();
-    const Vec3 right = forward.cross(up.stableNormalized()).normalized();
-    const Vec3 top = right.cross(forward);
-    const float half_height = std::tan(vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
-    const float pixel =
-        2.0f * half_height / static_cast<float>(height); // on the plane at distance 1
-    return (forward + (x - 0.5f * static_cast<float>(width)) * pixel * right
-            + (0.5f * static_cast<float>(height) - y) * pixel * top)
+    const Vec3 ahead = forward(), across = right(), upwards = across.cross(ahead);
+    const float pixel = pixel_size();
+    return (ahead + (x - 0.5f * static_cast<float>(width)) * pixel * across
+            + (0.5f * static_cast<float>(height) - y) * pixel * upwards)
         .normalized();
 }
 

@@ -101,6 +101,12 @@ void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
     if (!file.close()) throw FileError(path, "cannot be written: " + reason());
 }
 
+void write_file(const std::string& path, std::string_view content) {
+    write_atomically(path, [&](const std::string& temporary) {
+        write_bytes(temporary, std::as_bytes(std::span(content)));
+    });
+}
+
 MappedFile::MappedFile(const std::string& path) {
     const Descriptor file(path,
                           O_RDONLY | O_NONBLOCK); // opening a pipe must not wait for its writer

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace afterglow {
 
@@ -18,6 +19,9 @@ void write_atomically(const std::string& path,
 /// Writes all bytes to a file or device, or throws FileError: a full disk does not go unnoticed.
 /// Not atomic by itself: call it inside write_atomically().
 void write_bytes(const std::string& path, std::span<const std::byte> bytes);
+
+/// Writes a file that is in memory, whole or not at all. Throws FileError.
+void write_file(const std::string& path, std::string_view content);
 
 /// A whole file, mapped read-only. Throws FileError.
 class MappedFile {

@@ -129,17 +129,12 @@ void write_image(const std::string& path, const Image& image, PixelType type,
     } catch (const std::exception& e) {
         throw FileError(path, std::string("cannot be encoded: ") + e.what());
     }
-    write_atomically(path, [&](const std::string& temporary) {
-        write_bytes(temporary, std::as_bytes(std::span(encoded)));
-    });
+    write_file(path, encoded);
 }
 
 void write_png_bytes(const std::string& path, int width, int height, std::span<const unsigned char> rgb) {
     assert(rgb.size() == 3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-    const std::string encoded = compress_png(width, height, rgb);
-    write_atomically(path, [&](const std::string& temporary) {
-        write_bytes(temporary, std::as_bytes(std::span(encoded)));
-    });
+    write_file(path, compress_png(width, height, rgb));
 }
 
 Image read_exr(const std::string& path) {

@@ -25,7 +25,8 @@ LIBRARIES = {  # how the included path starts -> the files, or folders' .cpp fil
     r"nlohmann/": {"transport/", "viewer/"},
     r"CLI/": {"transport/", "viewer/"},
     r"(GL|EGL|GLFW)/": {"viewer/", "viewer/gl.h"},
-    r"imgui\.h|backends/imgui_": {"viewer/"},
+    r"imgui\.h": {"viewer/"},
+    r"backends/imgui_": {"viewer/gui.cpp"},
 }
 
 

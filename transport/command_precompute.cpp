@@ -1,6 +1,7 @@
 #include "transport/command_precompute.h"
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "transport/cli_options.h"
@@ -178,7 +179,7 @@ void run(PrecomputeCommand& command) {
                            {"statistics", statistics},
                            {"bytes", std::filesystem::file_size(command.output)},
                            {"seconds", seconds_json(report, outer)}};
-        write_text(command.report, json.dump(1) + "\n");
+        write_file(command.report, json.dump(1) + "\n");
     }
     if (!command.run.quiet) print_results(command, transfer, report, links, outer);
 }

@@ -1,6 +1,7 @@
 #include "transport/command_reference.h"
 
 #include "core/error.h"
+#include "core/file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "transport/cli_options.h"
@@ -59,7 +60,7 @@ void write_report(const std::string& path, const ReferenceCommand& command, cons
     report["rays"] = achieved.rays;
     report["seconds"] = achieved.seconds;
     report["rays_per_second"] = static_cast<double>(achieved.rays) / achieved.seconds;
-    write_text(path, report.dump(1) + "\n");
+    write_file(path, report.dump(1) + "\n");
 }
 
 Achieved trace_points(const ReferenceCommand& command, const Surface& surface,

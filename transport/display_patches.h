@@ -51,8 +51,8 @@ public:
 
     /// Writes the patch of each pixel (no_index where there is no surface), and makes those that are
     /// missing, evaluating factors at about `most_new` places beyond one a large patch (5 to 30 us each
-    /// and thread). Returns how many pixels still wait for their right patch. The same calls in the same order give the same
-    /// patches at any number of threads.
+    /// and thread). Returns how many pixels still wait for their right patch. The same calls in the same
+    /// order give the same patches at any number of threads.
     std::size_t find(const PixelSurfaces& pixels, std::size_t most_new,
                      std::vector<std::uint32_t>& patch);
 
@@ -129,9 +129,10 @@ private:
     /// patches about the given share, as there may be many more than can be made.
     WantedLists look(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
                      double small_share, std::span<std::uint32_t> patch) const;
-    /// By key, which is as good as at random.
+    /// Patches for these pixels, as find() says.
     std::size_t serve(const PixelSurfaces& pixels, std::span<const std::uint32_t> which,
                       std::size_t most_new, std::vector<std::uint32_t>& patch);
+    /// By key, which is as good as at random.
     static std::vector<Group> group(std::vector<Wanted>& wanted);
     /// The first `count`, thus all over the picture, in the order of their pixels, so that what lies
     /// close is made together and lies close in memory.

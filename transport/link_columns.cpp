@@ -26,14 +26,10 @@ LinkColumns::LinkColumns(const Links& links, Index senders)
       count_(static_cast<std::size_t>(senders)) {
     const auto for_each_of_block = [&](Index block, const auto& visit) {
         const Index first = block * block_size;
-        for (Index i = first; i < std::min(receivers_, first + block_size); ++i) {
-            std::uint32_t sender = ~0u;
-            for (const PackedLink& packed : links.row(i)) {
-                const std::uint32_t bits = Links::bits_of(packed);
-                sender += Links::step_of(bits);
-                if (!Links::is_jump(bits)) visit(sender, pack(i - first, bits));
-            }
-        }
+        for (Index i = first; i < std::min(receivers_, first + block_size); ++i)
+            links.for_each_packed(i, [&](std::uint32_t sender, std::uint32_t bits) {
+                visit(sender, pack(i - first, bits));
+            });
     };
     // How many of each sender, then where they begin, then the entries themselves.
     const auto per_block = static_cast<std::size_t>(senders + 1);

@@ -18,15 +18,8 @@ public:
     /// Copies `links`, of so many senders.
     LinkColumns(const Links& links, Index senders);
 
-    Index receivers() const { return receivers_; }
-    Index senders() const { return senders_; }
     std::uint64_t links() const { return entry_.size(); }
     std::uint32_t links_of(Index sender) const { return count_[static_cast<std::size_t>(sender)]; }
-    std::size_t bytes() const {
-        return sizeof(std::uint32_t) * (entry_.size() + count_.size())
-               + sizeof(std::uint64_t) * begin_.size();
-    }
-
     /// By how much the coefficients of a sender change.
     struct Change {
         std::uint32_t sender;

@@ -110,9 +110,8 @@ void MovingLight::scale(const Rgb& factor) {
 }
 
 void MovingLight::follow_intensity(const Spotlight& light) {
-    if (light_ && light_->position == light.position && light_->direction == light.direction
-        && light_->inner_angle == light.inner_angle && light_->outer_angle == light.outer_angle
-        && (light_->intensity > 0.0f).all() && (light_->intensity != light.intensity).any()) {
+    if (light_ && light_->shines_alike(light) && (light_->intensity > 0.0f).all()
+        && (light_->intensity != light.intensity).any()) {
         const Rgb factor = light.intensity / light_->intensity;
         if (factor.isFinite().all()) {
             scale(factor);

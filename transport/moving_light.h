@@ -46,8 +46,6 @@ public:
     /// columns (the paper's, or with a given number of bounces) it is LightTransport::indirect.
     const VectorIrradiance& follow(const Spotlight& light, MovingLightStatistics* statistics = nullptr);
 
-    std::size_t bytes() const { return columns_ ? columns_->bytes() : 0; }
-
 private:
     const LightTransport& transport_;
     Options options_;

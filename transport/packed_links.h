@@ -106,12 +106,16 @@ struct Links {
     /// Calls visit(sender, LinkVector) for the links of a row, senders rising.
     template <class Visit>
     void for_each(Index i, const Visit& visit) const {
+        for_each_packed(i, [&](std::uint32_t sender, std::uint32_t bits) { visit(sender, vector_of(bits)); });
+    }
+    /// The same with the entry's bits.
+    template <class Visit>
+    void for_each_packed(Index i, const Visit& visit) const {
         std::uint32_t sender = ~0u;
         for (const PackedLink& packed : row(i)) {
             const std::uint32_t bits = bits_of(packed);
             sender += step_of(bits);
-            if (is_jump(bits)) continue;
-            visit(sender, vector_of(bits));
+            if (!is_jump(bits)) visit(sender, bits);
         }
     }
 

@@ -1,11 +1,9 @@
 #include "transport/provenance.h"
 
 #include "core/error.h"
-#include "core/file.h"
 
 #include <cstdio>
 #include <filesystem>
-#include <span>
 #include <system_error>
 #include <unistd.h>
 
@@ -30,12 +28,6 @@ std::map<std::string, std::string> light_attributes(const Spotlight& light) {
             {"afterglow.light_cone",
              number_text(light.inner_angle) + "," + number_text(light.outer_angle)},
             {"afterglow.light_intensity", vector_text(light.intensity.matrix())}};
-}
-
-void write_text(const std::string& path, const std::string& text) {
-    write_atomically(path, [&](const std::string& temporary) {
-        write_bytes(temporary, std::as_bytes(std::span(text)));
-    });
 }
 
 void check_output(const std::string& path) {

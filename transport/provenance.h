@@ -13,9 +13,6 @@ std::string number_text(double value);
 /// A light as string attributes of a picture: afterglow.light_position ...
 std::map<std::string, std::string> light_attributes(const Spotlight& light);
 
-/// Writes a small text file, whole or not at all. Throws FileError.
-void write_text(const std::string& path, const std::string& text);
-
 /// Throws FileError where no file of this name can be made because its folder is missing or may not
 /// be written to, so that a long computation does not end there.
 void check_output(const std::string& path);

@@ -17,6 +17,11 @@ struct Spotlight {
     /// Normalises the direction. Throws UsageError unless 0 <= inner <= outer <= 180, outer > 0,
     /// the direction is not zero and everything is finite (intensity also not negative).
     void check();
+    /// Whether another differs in intensity at most.
+    bool shines_alike(const Spotlight& other) const {
+        return position == other.position && direction == other.direction
+               && inner_angle == other.inner_angle && outer_angle == other.outer_angle;
+    }
     /// Share of the intensity sent at the cosine c of the angle from the axis, in [0, 1].
     float falloff(float c) const;
 };

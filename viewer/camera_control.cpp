@@ -21,22 +21,14 @@ void accept(Camera& camera, const Camera& moved) {
 /// The turn by which a view goes to the right and upwards, as far as `up` lets it.
 Eigen::Matrix3f turn(const Camera& camera, float right, float upwards) {
     const Vec3 up = camera.up.normalized();
-    const float from_up = std::acos(std::clamp(view_direction(camera).dot(up), -1.0f, 1.0f));
+    const float from_up = std::acos(std::clamp(camera.forward().dot(up), -1.0f, 1.0f));
     const float lifted = std::clamp(from_up - upwards, closest_to_up,
                                     static_cast<float>(EIGEN_PI) - closest_to_up);
-    return (Eigen::AngleAxisf(-right, up) * Eigen::AngleAxisf(from_up - lifted, right_of(camera)))
+    return (Eigen::AngleAxisf(-right, up) * Eigen::AngleAxisf(from_up - lifted, camera.right()))
         .toRotationMatrix();
 }
 
 } // namespace
-
-Vec3 view_direction(const Camera& camera) {
-    return (camera.target - camera.position).stableNormalized();
-}
-
-Vec3 right_of(const Camera& camera) {
-    return view_direction(camera).cross(camera.up.stableNormalized()).normalized();
-}
 
 void orbit(Camera& camera, const Vec3& pivot, float right, float upwards) {
     // The camera goes the other way than what is seen.
@@ -54,10 +46,8 @@ void look(Camera& camera, float right, float upwards) {
 }
 
 void pan(Camera& camera, float right, float upwards) {
-    const float height = 2.0f * std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0))
-                         * (camera.target - camera.position).norm();
-    const Vec3 top = right_of(camera).cross(view_direction(camera));
-    const Vec3 shift = -height * (right * right_of(camera) + upwards * top);
+    const float height = 2.0f * camera.half_height() * (camera.target - camera.position).norm();
+    const Vec3 shift = -height * (right * camera.right() + upwards * camera.top());
     Camera moved = camera;
     moved.position += shift;
     moved.target += shift;
@@ -73,8 +63,8 @@ void zoom(Camera& camera, const Vec3& towards, float factor) {
 }
 
 void fly(Camera& camera, float right, float upwards, float ahead) {
-    const Vec3 shift = right * right_of(camera) + upwards * camera.up.normalized()
-                       + ahead * view_direction(camera);
+    const Vec3 shift = right * camera.right() + upwards * camera.up.normalized()
+                       + ahead * camera.forward();
     Camera moved = camera;
     moved.position += shift;
     moved.target += shift;

@@ -22,8 +22,5 @@ void pan(Camera& camera, float right, float upwards);
 void zoom(Camera& camera, const Vec3& towards, float factor);
 /// Flies by so much [world] to the right, along `up` and ahead.
 void fly(Camera& camera, float right, float upwards, float ahead);
-/// Direction of the view; to its right.
-Vec3 view_direction(const Camera& camera);
-Vec3 right_of(const Camera& camera);
 
 } // namespace afterglow

@@ -134,10 +134,7 @@ void write_frame_path(const std::string& path, const std::vector<Frame>& frames)
                          {"direction", array(f.light.direction)},
                          {"cone", {f.light.inner_angle, f.light.outer_angle}},
                          {"intensity", array(f.light.intensity)}}}});
-    const std::string text = all.dump(1) + "\n";
-    write_atomically(path, [&](const std::string& temporary) {
-        write_bytes(temporary, std::as_bytes(std::span(text)));
-    });
+    write_file(path, all.dump(1) + "\n");
 }
 
 Frame frame_at(const std::vector<Frame>& frames, double time) {

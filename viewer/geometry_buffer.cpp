@@ -1,7 +1,6 @@
 #include "viewer/geometry_buffer.h"
 
 #include <array>
-#include <cmath>
 
 namespace afterglow {
 namespace {
@@ -92,15 +91,12 @@ void main() {
 /// Directions through pixels, not of unit length, as Camera::direction has them; through
 /// (x, y) + shift where (x, y) is asked for.
 Eigen::Matrix3f pixel_rays(const Camera& camera, const Vec2& shift) {
-    const Vec3 forward = (camera.target - camera.position).stableNormalized();
-    const Vec3 right = forward.cross(camera.up.stableNormalized()).normalized();
-    const Vec3 down = forward.cross(right);
-    const float half = std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
-    const float pixel = 2.0f * half / static_cast<float>(camera.height);
+    const Vec3 right = camera.right(), down = -camera.top();
+    const float pixel = camera.pixel_size();
     Eigen::Matrix3f rays;
     rays.col(0) = pixel * right;
     rays.col(1) = pixel * down;
-    rays.col(2) = forward + (shift.x() - 0.5f * static_cast<float>(camera.width)) * pixel * right
+    rays.col(2) = camera.forward() + (shift.x() - 0.5f * static_cast<float>(camera.width)) * pixel * right
                   + (shift.y() - 0.5f * static_cast<float>(camera.height)) * pixel * down;
     return rays;
 }
@@ -125,8 +121,8 @@ void GeometryBuffer::draw(const SceneMesh& mesh, const Camera& camera, const Vec
     if (!targets_ || targets_->width != camera.width || targets_->height != camera.height)
         targets_.emplace(gl_, camera.width, camera.height, mesh.has_normal_maps());
     camera_ = camera;
-    const bool reversed = gl_.ClipControl != nullptr;
-    ViewTransform view = view_transform(camera, mesh.farthest(camera.position), reversed);
+    const DepthTest depth(gl_);
+    ViewTransform view = view_transform(camera, mesh.farthest(camera.position), depth.reversed());
     // Pixel centres come to show what lies at `place`.
     const Vec2 shift = place - Vec2(0.5f, 0.5f);
     view.projection.row(0) -= 2.0f * shift.x() / static_cast<float>(camera.width) * view.projection.row(3);
@@ -134,25 +130,18 @@ void GeometryBuffer::draw(const SceneMesh& mesh, const Camera& camera, const Vec
 
     gl_.BindFramebuffer(GL_FRAMEBUFFER, targets_->framebuffer);
     gl_.Viewport(0, 0, camera.width, camera.height);
-    if (reversed) gl_.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    gl_.Enable(GL_DEPTH_TEST);
-    gl_.DepthMask(GL_TRUE);
-    gl_.DepthFunc(reversed ? GL_GREATER : GL_LESS);
     const std::array<float, 4> nothing = {0.0f, 0.0f, 0.0f, 0.0f};
     const std::array<GLuint, 4> no_surface = {no_index, 0, 0, 0};
-    const float farthest = reversed ? 0.0f : 1.0f;
     for (int target = 0; target < 3; ++target) gl_.ClearBufferfv(GL_COLOR, target, nothing.data());
     gl_.ClearBufferuiv(GL_COLOR, 3, no_surface.data());
     if (targets_->shown != 0) gl_.ClearBufferfv(GL_COLOR, 4, nothing.data());
-    gl_.ClearBufferfv(GL_DEPTH, 0, &farthest);
+    depth.clear();
 
     program_.use();
     program_.set("projection", view.projection);
     program_.set("eye", view.eye);
     program_.set("ray", pixel_rays(camera, shift));
     mesh.draw(program_, view, true);
-    gl_.Disable(GL_DEPTH_TEST);
-    if (reversed) gl_.ClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
 }
 
 const PixelSurfaces& GeometryBuffer::read() {
@@ -173,9 +162,8 @@ const PixelSurfaces& GeometryBuffer::read() {
         shown_.resize(size);
         read_target(GL_COLOR_ATTACHMENT4, float4_texels, shown_.data());
     }
-    const float half = std::tan(camera_.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
-    pixels_ = {targets_->width,  targets_->height, camera_.position,
-               2.0f * half / static_cast<float>(targets_->height), positions_, normals_, surfaces_};
+    pixels_ = {targets_->width, targets_->height, camera_.position, camera_.pixel_size(),
+               positions_,      normals_,         surfaces_};
     return pixels_;
 }
 

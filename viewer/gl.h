@@ -14,20 +14,19 @@ namespace afterglow {
     X(BINDATTRIBLOCATION, BindAttribLocation) X(BINDBUFFER, BindBuffer)                            \
     X(BINDFRAGDATALOCATION, BindFragDataLocation) X(BINDFRAMEBUFFER, BindFramebuffer)              \
     X(BINDTEXTURE, BindTexture) X(BINDVERTEXARRAY, BindVertexArray) X(BLENDFUNC, BlendFunc)        \
-    X(BLITFRAMEBUFFER, BlitFramebuffer) X(BUFFERDATA, BufferData)                                  \
-    X(BUFFERSUBDATA, BufferSubData) X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus)              \
-    X(CLEAR, Clear) X(CLEARBUFFERFV, ClearBufferfv) X(CLEARBUFFERUIV, ClearBufferuiv)              \
-    X(CLEARCOLOR, ClearColor) X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram)      \
-    X(CREATESHADER, CreateShader) X(DELETEBUFFERS, DeleteBuffers)                                  \
-    X(DELETEFRAMEBUFFERS, DeleteFramebuffers) X(DELETEPROGRAM, DeleteProgram)                      \
-    X(DELETESHADER, DeleteShader) X(DELETETEXTURES, DeleteTextures)                                \
-    X(DELETEVERTEXARRAYS, DeleteVertexArrays) X(DEPTHFUNC, DepthFunc) X(DEPTHMASK, DepthMask)      \
-    X(DISABLE, Disable) X(DRAWARRAYS, DrawArrays) X(DRAWARRAYSINSTANCED, DrawArraysInstanced)      \
-    X(DRAWBUFFERS, DrawBuffers) X(ENABLE, Enable)                                                  \
+    X(BUFFERDATA, BufferData) X(BUFFERSUBDATA, BufferSubData)                                      \
+    X(CHECKFRAMEBUFFERSTATUS, CheckFramebufferStatus) X(CLEAR, Clear)                              \
+    X(CLEARBUFFERFV, ClearBufferfv) X(CLEARBUFFERUIV, ClearBufferuiv) X(CLEARCOLOR, ClearColor)    \
+    X(COMPILESHADER, CompileShader) X(CREATEPROGRAM, CreateProgram) X(CREATESHADER, CreateShader)  \
+    X(DELETEBUFFERS, DeleteBuffers) X(DELETEFRAMEBUFFERS, DeleteFramebuffers)                      \
+    X(DELETEPROGRAM, DeleteProgram) X(DELETESHADER, DeleteShader)                                  \
+    X(DELETETEXTURES, DeleteTextures) X(DELETEVERTEXARRAYS, DeleteVertexArrays)                    \
+    X(DEPTHFUNC, DepthFunc) X(DISABLE, Disable) X(DRAWARRAYS, DrawArrays)  \
+    X(DRAWARRAYSINSTANCED, DrawArraysInstanced) X(DRAWBUFFERS, DrawBuffers) X(ENABLE, Enable)      \
     X(ENABLEVERTEXATTRIBARRAY, EnableVertexAttribArray) X(FINISH, Finish)                          \
     X(FRAMEBUFFERTEXTURE2D, FramebufferTexture2D)                                                  \
-    X(FRAMEBUFFERTEXTURELAYER, FramebufferTextureLayer) X(FRONTFACE, FrontFace)                    \
-    X(GENBUFFERS, GenBuffers) X(GENFRAMEBUFFERS, GenFramebuffers) X(GENTEXTURES, GenTextures)      \
+    X(FRAMEBUFFERTEXTURELAYER, FramebufferTextureLayer) X(GENBUFFERS, GenBuffers)                  \
+    X(GENFRAMEBUFFERS, GenFramebuffers) X(GENTEXTURES, GenTextures)                                \
     X(GENVERTEXARRAYS, GenVertexArrays) X(GETERROR, GetError) X(GETINTEGERV, GetIntegerv)          \
     X(GETPROGRAMINFOLOG, GetProgramInfoLog) X(GETPROGRAMIV, GetProgramiv)                          \
     X(GETSHADERINFOLOG, GetShaderInfoLog) X(GETSHADERIV, GetShaderiv) X(GETSTRING, GetString)      \
@@ -36,11 +35,9 @@ namespace afterglow {
     X(SHADERSOURCE, ShaderSource) X(TEXBUFFER, TexBuffer) X(TEXIMAGE2D, TexImage2D)                \
     X(TEXIMAGE3D, TexImage3D) X(TEXPARAMETERI, TexParameteri) X(TEXSUBIMAGE2D, TexSubImage2D)      \
     X(UNIFORM1F, Uniform1f) X(UNIFORM1I, Uniform1i) X(UNIFORM1UI, Uniform1ui)                      \
-    X(UNIFORM2F, Uniform2f) X(UNIFORM3F, Uniform3f) X(UNIFORM4F, Uniform4f)                        \
-    X(UNIFORMMATRIX3FV, UniformMatrix3fv) X(UNIFORMMATRIX4FV, UniformMatrix4fv)                    \
-    X(USEPROGRAM, UseProgram)                                                                      \
-    X(VERTEXATTRIBDIVISOR, VertexAttribDivisor) X(VERTEXATTRIBPOINTER, VertexAttribPointer)        \
-    X(VIEWPORT, Viewport)
+    X(UNIFORM2F, Uniform2f) X(UNIFORM3F, Uniform3f) X(UNIFORMMATRIX3FV, UniformMatrix3fv)          \
+    X(UNIFORMMATRIX4FV, UniformMatrix4fv) X(USEPROGRAM, UseProgram)                                \
+    X(VERTEXATTRIBPOINTER, VertexAttribPointer) X(VIEWPORT, Viewport)
 
 /// The functions of one OpenGL context, 3.3 core or later, as its driver has them.
 struct Gl {

@@ -27,11 +27,15 @@ GlName make_vertex_array(const Gl& gl) {
     return {gl, name, [](const Gl& g, GLuint n) { g.DeleteVertexArrays(1, &n); }};
 }
 
-GlName make_texture(const Gl& gl, const TexelFormat& format, int width, int height,
-                    const void* data) {
+GlName make_texture_name(const Gl& gl) {
     GLuint name = 0;
     gl.GenTextures(1, &name);
-    GlName texture(gl, name, [](const Gl& g, GLuint n) { g.DeleteTextures(1, &n); });
+    return {gl, name, [](const Gl& g, GLuint n) { g.DeleteTextures(1, &n); }};
+}
+
+GlName make_texture(const Gl& gl, const TexelFormat& format, int width, int height,
+                    const void* data) {
+    GlName texture = make_texture_name(gl);
     gl.BindTexture(GL_TEXTURE_2D, texture);
     gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
     gl.TexImage2D(GL_TEXTURE_2D, 0, format.internal, width, height, 0, format.format, format.type, data);
@@ -62,12 +66,25 @@ GlName make_framebuffer(const Gl& gl, std::initializer_list<GLuint> colours, GLu
     return framebuffer;
 }
 
-GlTextureBuffer::GlTextureBuffer(const Gl& gl, GLenum internal_format, std::size_t bytes_per_texel)
-    : gl_(&gl), format_(internal_format), texel_bytes_(bytes_per_texel), buffer_(make_buffer(gl)) {
-    GLuint name = 0;
-    gl.GenTextures(1, &name);
-    texture_ = GlName(gl, name, [](const Gl& g, GLuint n) { g.DeleteTextures(1, &n); });
+DepthTest::DepthTest(const Gl& gl) : gl_(gl) {
+    if (reversed()) gl_.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    gl_.Enable(GL_DEPTH_TEST);
+    gl_.DepthFunc(reversed() ? GL_GREATER : GL_LESS);
 }
+
+DepthTest::~DepthTest() {
+    gl_.Disable(GL_DEPTH_TEST);
+    if (reversed()) gl_.ClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+}
+
+void DepthTest::clear() const {
+    const float farthest = reversed() ? 0.0f : 1.0f;
+    gl_.ClearBufferfv(GL_DEPTH, 0, &farthest);
+}
+
+GlTextureBuffer::GlTextureBuffer(const Gl& gl, GLenum internal_format, std::size_t bytes_per_texel)
+    : gl_(&gl), format_(internal_format), texel_bytes_(bytes_per_texel), buffer_(make_buffer(gl)),
+      texture_(make_texture_name(gl)) {}
 
 void GlTextureBuffer::set(const void* data, std::size_t count, std::size_t first_changed) {
     GLint most = 0;
@@ -92,21 +109,25 @@ void GlTextureBuffer::set(const void* data, std::size_t count, std::size_t first
 
 namespace {
 
+/// Throws Error with OpenGL's own words unless a shader was compiled, or a program linked.
+void require(GLuint object, GLenum status, PFNGLGETSHADERIVPROC get,
+             PFNGLGETSHADERINFOLOGPROC get_log, const std::string& what) {
+    GLint good = GL_FALSE;
+    get(object, status, &good);
+    if (good == GL_TRUE) return;
+    std::string log(2000, '\0');
+    GLsizei length = 0;
+    get_log(object, static_cast<GLsizei>(log.size()), &length, log.data());
+    throw Error("OpenGL does not " + what + ": " + log.substr(0, static_cast<std::size_t>(length)));
+}
+
 GlName compile(const Gl& gl, GLenum type, const std::string& name, const std::string& source) {
     GlName shader(gl, gl.CreateShader(type), [](const Gl& g, GLuint n) { g.DeleteShader(n); });
     const std::string whole = "#version 330 core\n" + source;
     const char* text = whole.c_str();
     gl.ShaderSource(shader, 1, &text, nullptr);
     gl.CompileShader(shader);
-    GLint good = GL_FALSE;
-    gl.GetShaderiv(shader, GL_COMPILE_STATUS, &good);
-    if (good != GL_TRUE) {
-        std::string log(2000, '\0');
-        GLsizei length = 0;
-        gl.GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), &length, log.data());
-        throw Error("OpenGL does not compile the shader " + name + ": "
-                    + log.substr(0, static_cast<std::size_t>(length)));
-    }
+    require(shader, GL_COMPILE_STATUS, gl.GetShaderiv, gl.GetShaderInfoLog, "compile the shader " + name);
     return shader;
 }
 
@@ -124,15 +145,7 @@ GlProgram::GlProgram(const Gl& gl, const std::string& name, const std::string& v
     location = 0;
     for (const char* output : outputs) gl.BindFragDataLocation(program_, location++, output);
     gl.LinkProgram(program_);
-    GLint good = GL_FALSE;
-    gl.GetProgramiv(program_, GL_LINK_STATUS, &good);
-    if (good != GL_TRUE) {
-        std::string log(2000, '\0');
-        GLsizei length = 0;
-        gl.GetProgramInfoLog(program_, static_cast<GLsizei>(log.size()), &length, log.data());
-        throw Error("OpenGL does not link the shaders " + name + ": "
-                    + log.substr(0, static_cast<std::size_t>(length)));
-    }
+    require(program_, GL_LINK_STATUS, gl.GetProgramiv, gl.GetProgramInfoLog, "link the shaders " + name);
 }
 
 void GlProgram::bind(const char* name, int unit, GLenum target, GLuint texture) const {

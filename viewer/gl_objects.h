@@ -39,6 +39,7 @@ private:
 
 GlName make_buffer(const Gl& gl);
 GlName make_vertex_array(const Gl& gl);
+GlName make_texture_name(const Gl& gl); // of a texture of any kind, still without content
 
 /// What a texture holds, as OpenGL wants to be told.
 struct TexelFormat {
@@ -49,7 +50,6 @@ inline constexpr TexelFormat float4_texels = {GL_RGBA32F, GL_RGBA, GL_FLOAT};
 inline constexpr TexelFormat half4_texels = {GL_RGBA16F, GL_RGBA, GL_FLOAT};
 inline constexpr TexelFormat byte4_texels = {GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE};
 inline constexpr TexelFormat index_texels = {GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT};
-inline constexpr TexelFormat float_texels = {GL_R32F, GL_RED, GL_FLOAT};
 inline constexpr TexelFormat depth_texels = {GL_DEPTH_COMPONENT32F, GL_DEPTH_COMPONENT, GL_FLOAT};
 
 /// A two-dimensional texture without levels, read texel by texel unless told otherwise; its size in
@@ -60,6 +60,23 @@ GlName make_texture(const Gl& gl, const TexelFormat& format, int width, int heig
 /// A framebuffer that draws into these textures, in order, and the depth texture, where there is one.
 /// Throws Error where the driver cannot.
 GlName make_framebuffer(const Gl& gl, std::initializer_list<GLuint> colours, GLuint depth = 0);
+
+/// While it lives, what is nearest is drawn: with depths near / z, which keep their digits far away, where
+/// OpenGL can (4.5), else with the usual ones. See view_transform().
+class DepthTest {
+public:
+    explicit DepthTest(const Gl& gl);
+    ~DepthTest();
+    DepthTest(const DepthTest&) = delete;
+    DepthTest& operator=(const DepthTest&) = delete;
+
+    bool reversed() const { return gl_.ClipControl != nullptr; }
+    /// Of the framebuffer in use.
+    void clear() const;
+
+private:
+    const Gl& gl_;
+};
 
 /// Data that shaders read by index (samplerBuffer); grows as needed.
 class GlTextureBuffer {

@@ -11,17 +11,11 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <span>
 
 namespace afterglow {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-bool same_light(const Spotlight& a, const Spotlight& b) {
-    return a.position == b.position && a.direction == b.direction && a.inner_angle == b.inner_angle
-           && a.outer_angle == b.outer_angle && (a.intensity == b.intensity).all();
-}
 
 Json milliseconds(const FrameTimings& t) {
     return {{"geometry", 1e3 * t.geometry}, {"shadow_map", 1e3 * t.shadow_map},
@@ -61,7 +55,8 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
         frame.camera.height = options.height;
         frame.camera.check();
         MovingLightStatistics light;
-        if (k == 0 || !same_light(frame.light, frames[k - 1].light)) {
+        if (k == 0 || !frame.light.shines_alike(frames[k - 1].light)
+            || (frame.light.intensity != frames[k - 1].light.intensity).any()) {
             renderer.set_light(frame.light, solver.solve(frame.light));
             light = solver.statistics();
         }
@@ -88,11 +83,7 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
                          {"samples", options.samples},
                          {"unit", "ms"},
                          {"frames", timings}};
-    const std::string text = report.dump(1) + "\n";
-    write_atomically((std::filesystem::path(options.folder) / "timings.json").string(),
-                     [&](const std::string& temporary) {
-                         write_bytes(temporary, std::as_bytes(std::span(text)));
-                     });
+    write_file((std::filesystem::path(options.folder) / "timings.json").string(), report.dump(1) + "\n");
 }
 
 } // namespace afterglow

@@ -1,11 +1,9 @@
 #include "viewer/light_control.h"
 
 #include "core/error.h"
-#include "viewer/camera_control.h"
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <charconv>
 
 namespace afterglow {
@@ -31,12 +29,11 @@ std::string text(const auto& v) { return text(v[0]) + "," + text(v[1]) + "," + t
 } // namespace
 
 void move_along_view(Spotlight& light, const Camera& camera, float right, float upwards) {
-    const float ahead = (light.position - camera.position).dot(view_direction(camera));
-    const float height = 2.0f * std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0))
+    const float ahead = (light.position - camera.position).dot(camera.forward());
+    const float height = 2.0f * camera.half_height()
                          * std::max(ahead, 0.05f * (camera.target - camera.position).norm());
-    const Vec3 top = right_of(camera).cross(view_direction(camera));
     Spotlight moved = light;
-    moved.position += height * (right * right_of(camera) + upwards * top);
+    moved.position += height * (right * camera.right() + upwards * camera.top());
     accept(light, moved);
 }
 
@@ -56,7 +53,7 @@ void widen(Spotlight& light, float factor) {
 void put_at_camera(Spotlight& light, const Camera& camera) {
     Spotlight moved = light;
     moved.position = camera.position;
-    moved.direction = view_direction(camera);
+    moved.direction = camera.forward();
     accept(light, moved);
 }
 

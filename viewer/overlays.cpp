@@ -1,7 +1,5 @@
 #include "viewer/overlays.h"
 
-#include "viewer/camera_control.h"
-
 #include <imgui.h>
 
 #include <algorithm>
@@ -23,13 +21,12 @@ ImU32 signed_colour(float x) {
 } // namespace
 
 std::optional<Vec2> project(const Camera& camera, const Vec3& x) {
-    const Vec3 forward = view_direction(camera), right = right_of(camera), d = x - camera.position;
-    const float ahead = d.dot(forward);
+    const Vec3 d = x - camera.position;
+    const float ahead = d.dot(camera.forward());
     if (!(ahead > 0.0f)) return {};
-    const float half = std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
-    const float scale = static_cast<float>(camera.height) / (2.0f * half * ahead);
-    const Vec2 p(0.5f * static_cast<float>(camera.width) + scale * d.dot(right),
-                 0.5f * static_cast<float>(camera.height) - scale * d.dot(right.cross(forward)));
+    const float scale = 1.0f / (camera.pixel_size() * ahead);
+    const Vec2 p(0.5f * static_cast<float>(camera.width) + scale * d.dot(camera.right()),
+                 0.5f * static_cast<float>(camera.height) - scale * d.dot(camera.top()));
     if (!(p.x() >= 0.0f && p.y() >= 0.0f && p.x() < static_cast<float>(camera.width) && p.y() < static_cast<float>(camera.height)))
         return {};
     return p;
@@ -82,12 +79,12 @@ void Overlays::draw_points(ImDrawList& list, int level, const Camera& camera,
     if (with_coefficients)
         for (std::uint32_t j = points.begin(level); j < points.end(level); ++j)
             largest = std::max(largest, std::abs(value(j)));
-    const float half = std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+    const float pixel = camera.pixel_size();
     for (std::uint32_t j = points.begin(level); j < points.end(level); ++j) {
         const std::optional<Vec2> p = visible(camera, pixels, j);
         if (!p) continue;
         const float distance = (points.position.col(j) - camera.position).norm();
-        const float radius = 0.25f * points.spacing[level] * static_cast<float>(camera.height) / (2.0f * half * distance);
+        const float radius = 0.25f * points.spacing[level] / (pixel * distance);
         const ImU32 colour = with_coefficients ? signed_colour(largest > 0.0f ? value(j) / largest : 0.0f)
                                                : IM_COL32(255, 210, 60, 220);
         list.AddCircleFilled(at(*p), std::clamp(radius, 1.5f, 9.0f), colour, radius > 3.0f ? 12 : 6);

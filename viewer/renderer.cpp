@@ -12,11 +12,6 @@
 namespace afterglow {
 namespace {
 
-bool same_view(const Camera& a, const Camera& b) {
-    return a.position == b.position && a.target == b.target && a.up == b.up
-           && a.vertical_fov == b.vertical_fov && a.width == b.width && a.height == b.height;
-}
-
 bool shadows_alike(const Spotlight& a, const Spotlight& b) {
     return a.position == b.position && a.direction == b.direction && a.outer_angle == b.outer_angle;
 }
@@ -90,7 +85,7 @@ Image Renderer::average(const Camera& camera, ViewLayer layer, int samples) {
 
 void Renderer::draw(const Camera& camera, ViewLayer layer, std::size_t most_new, const Vec2& place) {
     timings_ = {};
-    if (!camera_ || !same_view(camera, *camera_) || place != place_) draw_geometry(camera, place);
+    if (camera_ != camera || place != place_) draw_geometry(camera, place);
     const bool wants_direct = layer == ViewLayer::full || layer == ViewLayer::direct;
     const bool wants_indirect = is_light(layer) && layer != ViewLayer::direct;
     if (field_ && wants_direct) draw_direct();

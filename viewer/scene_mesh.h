@@ -14,7 +14,6 @@ public:
     /// Copies what it needs.
     SceneMesh(const Gl& gl, const Scene& scene);
 
-    const Eigen::AlignedBox3f& bounds() const { return bounds_; }
     /// The longest way from a place to any of the scene.
     float farthest(const Vec3& from) const;
 

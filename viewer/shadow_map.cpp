@@ -9,7 +9,7 @@ namespace afterglow {
 namespace {
 
 constexpr float widest_single = 45.0f; // half-angle of the cone [degrees]
-constexpr int single_side = 2048, cube_side = 2048;
+constexpr int side = 2048; // of a picture [texels]
 constexpr float margin = 4.0f; // texels around what is needed, for the blend
 
 const char* const distance_vertex_shader = R"(
@@ -119,11 +119,9 @@ ShadowMap::ShadowMap(const Gl& gl)
                      {"irradiance"}),
       vertex_array_(make_vertex_array(gl)) {}
 
-void ShadowMap::prepare(int side, int layers) {
-    if (side == side_ && layers == layers_) return;
-    GLuint name = 0;
-    gl_.GenTextures(1, &name);
-    distances_ = GlName(gl_, name, [](const Gl& g, GLuint n) { g.DeleteTextures(1, &n); });
+void ShadowMap::prepare(int layers) {
+    if (layers == layers_) return;
+    distances_ = make_texture_name(gl_);
     gl_.BindTexture(GL_TEXTURE_2D_ARRAY, distances_);
     gl_.TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_R32F, side, side, layers, 0, GL_RED, GL_FLOAT, nullptr);
     gl_.TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -133,7 +131,6 @@ void ShadowMap::prepare(int side, int layers) {
     framebuffer_ = make_framebuffer(gl_, {}, depth_);
     const GLenum colour = GL_COLOR_ATTACHMENT0;
     gl_.DrawBuffers(1, &colour);
-    side_ = side;
     layers_ = layers;
 }
 
@@ -145,7 +142,7 @@ void ShadowMap::draw(const SceneMesh& mesh, const Spotlight& light) {
         const Vec3 right = light.direction.unitOrthogonal();
         faces_.push_back({light.direction, right, right.cross(light.direction)});
         half_angle = light.outer_angle;
-        prepare(single_side, 1);
+        prepare(1);
     } else {
         // No face is farther from its centre than 54.74 degrees.
         for (int axis = 0; axis < 3; ++axis)
@@ -156,35 +153,29 @@ void ShadowMap::draw(const SceneMesh& mesh, const Spotlight& light) {
                 const Vec3 right = Vec3::Unit((axis + 1) % 3);
                 faces_.push_back({forward, right, right.cross(forward)});
             }
-        prepare(cube_side, 6);
+        prepare(6);
     }
     half_width_ = std::tan(half_angle * static_cast<float>(EIGEN_PI / 180.0))
-                  / (1.0f - 2.0f * margin / static_cast<float>(side_));
+                  / (1.0f - 2.0f * margin / static_cast<float>(side));
 
-    const bool reversed = gl_.ClipControl != nullptr;
-    if (reversed) gl_.ClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    const DepthTest depth(gl_);
     gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
-    gl_.Viewport(0, 0, side_, side_);
-    gl_.Enable(GL_DEPTH_TEST);
-    gl_.DepthFunc(reversed ? GL_GREATER : GL_LESS);
+    gl_.Viewport(0, 0, side, side);
     distance_program_.use();
     for (std::size_t k = 0; k < faces_.size(); ++k) {
         gl_.FramebufferTextureLayer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, distances_, 0, static_cast<GLint>(k));
         if (gl_.CheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
             throw Error("OpenGL cannot draw a shadow map of floats (" + gl_.renderer() + ")");
         const std::array<float, 4> nothing = {0.0f, 0.0f, 0.0f, 0.0f};
-        const float farthest = reversed ? 0.0f : 1.0f;
         gl_.ClearBufferfv(GL_COLOR, 0, nothing.data());
-        gl_.ClearBufferfv(GL_DEPTH, 0, &farthest);
+        depth.clear();
         const ViewTransform view =
             view_transform(light.position, faces_[k].forward, faces_[k].right, faces_[k].down,
-                           half_width_, half_width_, mesh.farthest(light.position), reversed);
+                           half_width_, half_width_, mesh.farthest(light.position), depth.reversed());
         distance_program_.set("projection", view.projection);
         distance_program_.set("eye", view.eye);
         mesh.draw(distance_program_, view, false);
     }
-    gl_.Disable(GL_DEPTH_TEST);
-    if (reversed) gl_.ClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
 }
 
 void ShadowMap::shade(const SceneMesh& mesh, const GeometryBuffer& pixels, GLuint framebuffer,

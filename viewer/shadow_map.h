@@ -36,12 +36,12 @@ private:
     GlProgram distance_program_, shade_program_;
     GlName vertex_array_; // of passes without attributes
     GlName distances_, depth_, framebuffer_;
-    int side_ = 0, layers_ = 0; // size of the textures
+    int layers_ = 0; // of the textures
     std::vector<Face> faces_;
     float half_width_ = 1.0f; // of the pictures, at distance one
     Spotlight light_;
 
-    void prepare(int side, int layers);
+    void prepare(int layers);
 };
 
 } // namespace afterglow

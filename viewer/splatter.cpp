@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 namespace afterglow {
 namespace {
@@ -199,13 +198,11 @@ void Splatter::draw(const GeometryBuffer& pixels, const Camera& camera, const Di
     gl_.ClearBufferfv(GL_COLOR, 0, nothing.data());
     bind(add_program_);
     add_program_.bind("visible", 6, GL_TEXTURE_BUFFER, visible_functions_.texture());
-    const Vec3 forward = (camera.target - camera.position).stableNormalized();
-    const Vec3 right = forward.cross(camera.up.stableNormalized()).normalized();
-    const float half = std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+    const float half = camera.half_height();
     add_program_.set("eye", camera.position);
-    add_program_.set("forward", forward);
-    add_program_.set("right", right);
-    add_program_.set("down", Vec3(forward.cross(right)));
+    add_program_.set("forward", camera.forward());
+    add_program_.set("right", camera.right());
+    add_program_.set("down", Vec3(-camera.top()));
     add_program_.set("half_size", Vec2(half * static_cast<float>(width) / static_cast<float>(height), half));
     add_program_.set("weight_power", weight_power_);
     gl_.Enable(GL_BLEND);

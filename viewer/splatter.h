@@ -26,8 +26,6 @@ public:
     /// `patch`: of each pixel, as from DisplayPatches::find.
     void draw(const GeometryBuffer& pixels, const Camera& camera, const DisplayPatches& patches,
               std::span<const std::uint32_t> patch, GLuint framebuffer);
-    /// How many functions the last draw() had.
-    std::size_t functions_drawn() const { return visible_.size(); }
 
 private:
     struct Targets {
@@ -44,8 +42,8 @@ private:
     std::size_t rows_there_ = 0, entries_there_ = 0; // of the patches
     std::uint64_t generation_ = 0;
     std::vector<std::uint32_t> visible_;
-    std::vector<std::uint8_t> is_listed_; // a patch each; a function each
-    std::vector<std::uint8_t> is_visible_;
+    std::vector<std::uint8_t> is_listed_;  // a patch each
+    std::vector<std::uint8_t> is_visible_; // a function each
 
     void copy_patches(const DisplayPatches& patches);
     void find_visible(const DisplayPatches& patches, std::span<const std::uint32_t> patch);

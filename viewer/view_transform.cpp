@@ -1,7 +1,5 @@
 #include "viewer/view_transform.h"
 
-#include <cmath>
-
 namespace afterglow {
 
 bool ViewTransform::may_see(const Eigen::AlignedBox3f& box) const {
@@ -24,7 +22,6 @@ ViewTransform view_transform(const Vec3& eye, const Vec3& forward, const Vec3& r
                              bool reversed_depth) {
     ViewTransform view;
     view.eye = eye;
-    view.reversed_depth = reversed_depth;
     view.projection.setZero();
     view.projection.block<1, 3>(0, 0) = right.transpose() / half_width;
     view.projection.block<1, 3>(1, 0) = down.transpose() / half_height;
@@ -40,12 +37,10 @@ ViewTransform view_transform(const Vec3& eye, const Vec3& forward, const Vec3& r
 }
 
 ViewTransform view_transform(const Camera& camera, float scene_size, bool reversed_depth) {
-    const Vec3 forward = (camera.target - camera.position).stableNormalized();
-    const Vec3 right = forward.cross(camera.up.stableNormalized()).normalized();
-    const float half = std::tan(camera.vertical_fov * static_cast<float>(EIGEN_PI / 360.0));
+    const float half = camera.half_height();
     const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
-    return view_transform(camera.position, forward, right, forward.cross(right), half * aspect, half,
-                          scene_size, reversed_depth);
+    return view_transform(camera.position, camera.forward(), camera.right(), -camera.top(), half * aspect,
+                          half, scene_size, reversed_depth);
 }
 
 } // namespace afterglow

@@ -13,7 +13,6 @@ namespace afterglow {
 struct ViewTransform {
     Vec3 eye = Vec3::Zero();
     Eigen::Matrix4f projection = Eigen::Matrix4f::Identity(); // of x - eye
-    bool reversed_depth = false; // depth is near / z, and falls from 1 to 0 at infinity
 
     /// Whether any part of a box may be seen.
     bool may_see(const Eigen::AlignedBox3f& box) const;

@@ -7,8 +7,6 @@
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
-#include <backends/imgui_impl_glfw.h>
-#include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
 #include <algorithm>
@@ -37,35 +35,15 @@ void remember(std::vector<float>& values, double seconds) {
 } // namespace
 
 ViewerApp::ViewerApp(const ViewerOptions& options)
-    : options_(options), window_(options.width, options.height, "Afterglow"), layer_(options.layer),
-      exposure_(options.exposure) {
+    : options_(options), window_(options.width, options.height, "Afterglow"), gui_(window_),
+      layer_(options.layer), exposure_(options.exposure) {
     connect_events();
-    IMGUI_CHECKVERSION();
-    ImGui::CreateContext();
-    ImGui::GetIO().IniFilename = nullptr;
-    ImGui::StyleColorsDark();
-    ImGui_ImplGlfw_InitForOpenGL(window_.handle(), true); // calls our events, too
-    ImGui_ImplOpenGL3_Init("#version 330 core");
-    try {
-        open(options.file);
-        if (!session_ && !precompute_) throw Error(message_);
-        if (!options.frames.empty()) {
-            path_ = read_frame_path(options.frames);
-            playing_since_ = now();
-        }
-    } catch (...) {
-        ImGui_ImplOpenGL3_Shutdown();
-        ImGui_ImplGlfw_Shutdown();
-        ImGui::DestroyContext();
-        throw;
+    open(options.file);
+    if (!session_ && !precompute_) throw Error(message_);
+    if (!options.frames.empty()) {
+        path_ = read_frame_path(options.frames);
+        playing_since_ = now();
     }
-}
-
-ViewerApp::~ViewerApp() {
-    session_.reset();
-    ImGui_ImplOpenGL3_Shutdown();
-    ImGui_ImplGlfw_Shutdown();
-    ImGui::DestroyContext();
 }
 
 void ViewerApp::open(const std::string& path) {
@@ -247,7 +225,6 @@ void ViewerApp::toggle_recording() {
     const std::string file = numbered("path", ".json");
     write_frame_path(file, path_);
     message_ = "wrote " + file + ", " + std::to_string(path_.size()) + " frames; space plays it";
-    ++pictures_written_;
 }
 
 void ViewerApp::record() {
@@ -268,7 +245,7 @@ void ViewerApp::play() {
 }
 
 std::string ViewerApp::numbered(const std::string& kind, const std::string& ending) const {
-    for (int k = pictures_written_;; ++k) {
+    for (int k = 0;; ++k) {
         const std::string name =
             (std::filesystem::path(options_.folder) / (kind + "_" + std::to_string(k) + ending)).string();
         if (!std::filesystem::exists(name)) return name;
@@ -343,10 +320,7 @@ void ViewerApp::step() {
     }
     const Camera& camera = session_->camera;
     if (window_.width() < 1 || window_.height() < 1) return; // minimised
-    if (camera.position != before.position || camera.target != before.target
-        || camera.vertical_fov != before.vertical_fov || camera.width != before.width
-        || camera.height != before.height)
-        picture_is_old_ = true;
+    if (camera != before) picture_is_old_ = true;
     if (picture_is_old_) draw_picture();
     draw_window();
 }
@@ -356,23 +330,18 @@ void ViewerApp::draw_waiting() {
     gl.BindFramebuffer(GL_FRAMEBUFFER, 0);
     gl.ClearColor(0.1f, 0.1f, 0.1f, 1.0f);
     gl.Clear(GL_COLOR_BUFFER_BIT);
-    ImGui_ImplOpenGL3_NewFrame();
-    ImGui_ImplGlfw_NewFrame();
-    ImGui::NewFrame();
+    gui_.begin();
     ImGui::SetNextWindowPos({10.0f, 10.0f}, ImGuiCond_FirstUseEver);
     if (ImGui::Begin("Afterglow", nullptr, ImGuiWindowFlags_AlwaysAutoResize)) draw_precompute_panel();
     ImGui::End();
-    ImGui::Render();
-    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    gui_.end();
     window_.swap();
 }
 
 void ViewerApp::draw_window() {
     session_->renderer.composition().show(0, 0, 0, window_.width(), window_.height(), is_light(layer_),
                                           tone_map_, exposure_);
-    ImGui_ImplOpenGL3_NewFrame();
-    ImGui_ImplGlfw_NewFrame();
-    ImGui::NewFrame();
+    gui_.begin();
     ImDrawList& over_picture = *ImGui::GetBackgroundDrawList();
     if (overlay_ != Overlay::none)
         session_->overlays.draw(over_picture, overlay_, overlay_level_, session_->camera,
@@ -381,8 +350,7 @@ void ViewerApp::draw_window() {
         draw_light(over_picture, session_->light, session_->camera, 0.05f * session_->scene_size);
         draw_panels();
     }
-    ImGui::Render();
-    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    gui_.end();
     if (screenshot_wanted_) write_screenshot(numbered("window", ".png"));
     screenshot_wanted_ = false;
     window_.swap();

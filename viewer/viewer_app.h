@@ -2,6 +2,7 @@
 
 #include "viewer/frame_path.h"
 #include "viewer/glfw_window.h"
+#include "viewer/gui.h"
 #include "viewer/precompute_task.h"
 #include "viewer/session.h"
 
@@ -29,7 +30,6 @@ class ViewerApp {
 public:
     /// Opens the window and the file. Throws Error, FileError.
     explicit ViewerApp(const ViewerOptions& options);
-    ~ViewerApp();
 
     /// Until the window is closed. Throws Error where OpenGL failed.
     void run();
@@ -39,6 +39,7 @@ private:
 
     ViewerOptions options_;
     GlfwWindow window_;
+    Gui gui_;
     std::unique_ptr<Session> session_;
     std::unique_ptr<PrecomputeTask> precompute_;
 
@@ -53,7 +54,6 @@ private:
     bool picture_is_old_ = true;
     std::size_t most_new_ = 2000; // patches a picture, so that it takes about most_patch_seconds
     bool screenshot_wanted_ = false;
-    int pictures_written_ = 0;
 
     // What the person does.
     Drag drag_ = Drag::none;

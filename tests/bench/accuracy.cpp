@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "core/file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
 #include "core/sampling.h"
@@ -242,7 +243,7 @@ void run_measure(const Common& common, const MeasureOptions& options) {
         all.push_back(entry);
         std::fflush(stdout);
     }
-    if (!options.json.empty()) write_text(options.json, all.dump(1) + "\n");
+    if (!options.json.empty()) write_file(options.json, all.dump(1) + "\n");
 }
 
 } // namespace

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <span>
 #include <sstream>
 
 namespace afterglow {
@@ -50,10 +49,7 @@ void report(const Family& family, const std::string& folder) {
         std::fflush(stdout);
     }
     if (folder.empty()) return;
-    const std::string text = csv.str();
-    write_atomically(folder + "/" + family.name + ".csv", [&](const std::string& temporary) {
-        write_bytes(temporary, std::as_bytes(std::span(text)));
-    });
+    write_file(folder + "/" + family.name + ".csv", csv.str());
 }
 
 } // namespace afterglow

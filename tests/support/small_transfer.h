@@ -15,6 +15,15 @@ inline PrecomputeOptions small_options() {
     return options;
 }
 
+/// With links enough for thresholds and walls to matter; some seconds' work.
+inline PrecomputeOptions medium_options() {
+    PrecomputeOptions options;
+    options.receiver_levels = 4;
+    options.sender_levels = 3;
+    options.links.rays = 128;
+    return options;
+}
+
 inline PrecomputeOptions small_paper_options() {
     PrecomputeOptions options = PrecomputeOptions::paper();
     options.coarse_radius = 0.4f;

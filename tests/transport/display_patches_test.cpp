@@ -1,47 +1,33 @@
 #include "transport/display_patches.h"
 
-#include "core/builtin_scenes.h"
 #include "core/camera.h"
 #include "core/parallel.h"
+#include "tests/support/small_transfer.h"
 #include "transport/display.h"
 #include "transport/display_field.h"
-#include "transport/precompute.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 
 namespace afterglow {
 namespace {
 
-/// Two rooms with a door, or another built-in scene, its operator and its indirect light.
-struct Example {
-    Scene scene;
-    Surface surface;
-    TransferOperator transfer;
-    ShepardBasis basis;
+/// The Cornell box, its operator and indirect light.
+struct Example : SmallTransfer {
+    ShepardBasis basis{transfer.points, surface, true, transfer.points.levels() - 1};
     VectorIrradiance field;
 
-    explicit Example(const std::string& name)
-        : scene(make_builtin_scene(name)), surface(scene), transfer(make(surface)),
-          basis(transfer.points, surface, true, transfer.points.levels() - 1) {
+    Example() : SmallTransfer{medium_options()} {
         Spotlight light{.position = *scene.viewpoint, .direction = Vec3(0.3f, -0.5f, 1.0f)};
         light.check();
         field = LightTransport(transfer, surface).indirect(light);
     }
     int level() const { return transfer.points.levels() - 1; }
-    static TransferOperator make(const Surface& surface) {
-        PrecomputeOptions options;
-        options.receiver_levels = 4;
-        options.sender_levels = 3;
-        options.links.rays = 64;
-        return precompute(surface, options);
-    }
 };
 
 const Example& cornell() {
-    static const Example example("builtin:cornell");
+    static const Example example;
     return example;
 }
 
@@ -63,9 +49,7 @@ struct Pixels {
             }
     }
     PixelSurfaces view() const {
-        const float half = camera.vertical_fov * static_cast<float>(EIGEN_PI) / 360.0f;
-        return {camera.width,    camera.height, camera.position, 2.0f * std::tan(half) / camera.height,
-                position,        normal,        surface};
+        return {camera.width, camera.height, camera.position, camera.pixel_size(), position, normal, surface};
     }
 };
 

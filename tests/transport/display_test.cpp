@@ -1,4 +1,5 @@
 #include "core/builtin_scenes.h"
+#include "tests/support/small_transfer.h"
 #include "tests/support/surface_samples.h"
 #include "transport/display.h"
 #include "transport/precompute.h"
@@ -17,15 +18,8 @@ struct Example {
     TransferOperator transfer;
 
     explicit Example(const std::string& name)
-        : scene(make_builtin_scene(name)), surface(scene), transfer(make(surface)) {}
-
-    static TransferOperator make(const Surface& surface) {
-        PrecomputeOptions options;
-        options.receiver_levels = 4;
-        options.sender_levels = 3;
-        options.links.rays = 128;
-        return precompute(surface, options);
-    }
+        : scene(make_builtin_scene(name)), surface(scene),
+          transfer(precompute(surface, medium_options())) {}
 };
 
 TEST(Display, CoversAllThatIsInSightAndIsNeverNegative) {

@@ -11,15 +11,8 @@
 namespace afterglow {
 namespace {
 
-/// The Cornell box with links enough for thresholds to matter.
 const SmallTransfer& example() {
-    static const SmallTransfer transfer = [] {
-        PrecomputeOptions options;
-        options.receiver_levels = 4;
-        options.sender_levels = 3;
-        options.links.rays = 128;
-        return SmallTransfer{options};
-    }();
+    static const SmallTransfer transfer{medium_options()};
     return transfer;
 }
 

@@ -1,5 +1,4 @@
-#include "transport/precompute.h"
-#include "transport/transfer_file.h"
+#include "tests/support/small_transfer.h"
 
 #include "tests/support/program.h" // its `light` must not come before others' parameters
 
@@ -23,15 +22,7 @@ struct Files {
     std::string frames = folder.write("path.json", path_text);
 
     Files() {
-        const Scene scene = load_scene("builtin:cornell");
-        const Surface surface(scene);
-        PrecomputeOptions options;
-        options.coarse_radius = 0.4f;
-        options.receiver_levels = 3;
-        options.sender_levels = 2;
-        options.links.rays = 64;
-        save_transfer(file, precompute(surface, options),
-                      {AFTERGLOW_VERSION, scene.name, scene.content_hash(), 1, "{}", "{}"});
+        save_transfer(file, small_transfer().transfer, small_transfer().provenance);
     }
     std::string frame_options(const std::string& output) const {
         return " --headless --frames '" + frames + "' -o '" + folder.path(output) + "' --size 64x48 ";

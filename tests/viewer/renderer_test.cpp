@@ -3,8 +3,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/tone_map.h"
+#include "tests/support/small_transfer.h"
 #include "tests/support/temporary_folder.h"
-#include "transport/precompute.h"
 #include "transport/renderer.h"
 #include "viewer/gl_context.h"
 #include "viewer/light_solver.h"
@@ -29,9 +29,7 @@ const TransferScene& opened(const std::string& scene_name) {
     if (!scene) {
         const Scene source = load_scene(scene_name);
         const Surface surface(source);
-        PrecomputeOptions options;
-        options.receiver_levels = 4;
-        options.sender_levels = 3;
+        PrecomputeOptions options = medium_options();
         options.links.rays = 64;
         const std::string file = folder.path(std::to_string(all.size()) + ".afterglow");
         save_transfer(file, precompute(surface, options),
