@@ -31,6 +31,23 @@ RTCRay to_embree(const Ray& ray) {
     return r;
 }
 
+constexpr std::size_t packet_width = 8;
+
+void put(RTCRay8& packet, std::size_t k, const Ray& ray) {
+    packet.org_x[k] = ray.origin.x();
+    packet.org_y[k] = ray.origin.y();
+    packet.org_z[k] = ray.origin.z();
+    packet.dir_x[k] = ray.direction.x();
+    packet.dir_y[k] = ray.direction.y();
+    packet.dir_z[k] = ray.direction.z();
+    packet.tnear[k] = 0.0f;
+    packet.tfar[k] = ray.length;
+    packet.time[k] = 0.0f;
+    packet.mask[k] = ~0u;
+    packet.id[k] = 0;
+    packet.flags[k] = 0;
+}
+
 } // namespace
 
 Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tree>()) {
@@ -87,28 +104,15 @@ Hit Surface::closest_hit(const Ray& ray) const {
 }
 
 void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const {
-    constexpr std::size_t width = 8;
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    alignas(32) int valid[width];
+    alignas(32) int valid[packet_width];
     alignas(32) RTCRayHit8 packet;
-    for (std::size_t begin = 0; begin < rays.size(); begin += width) {
-        const std::size_t count = std::min(width, rays.size() - begin);
-        for (std::size_t k = 0; k < width; ++k) {
+    for (std::size_t begin = 0; begin < rays.size(); begin += packet_width) {
+        const std::size_t count = std::min(packet_width, rays.size() - begin);
+        for (std::size_t k = 0; k < packet_width; ++k) {
             valid[k] = k < count ? -1 : 0;
-            const Ray& ray = rays[begin + std::min(k, count - 1)];
-            packet.ray.org_x[k] = ray.origin.x();
-            packet.ray.org_y[k] = ray.origin.y();
-            packet.ray.org_z[k] = ray.origin.z();
-            packet.ray.dir_x[k] = ray.direction.x();
-            packet.ray.dir_y[k] = ray.direction.y();
-            packet.ray.dir_z[k] = ray.direction.z();
-            packet.ray.tnear[k] = 0.0f;
-            packet.ray.tfar[k] = ray.length;
-            packet.ray.time[k] = 0.0f;
-            packet.ray.mask[k] = ~0u;
-            packet.ray.id[k] = 0;
-            packet.ray.flags[k] = 0;
+            put(packet.ray, k, rays[begin + std::min(k, count - 1)]);
             packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
         }
         rtcIntersect8(valid, tree_->scene, &context, &packet);
@@ -143,6 +147,26 @@ bool Surface::blocked(const Vec3& from, const Vec3& to) const {
     const float length = step.norm();
     if (!(length > 0.0f)) return false;
     return occluded({from, step / length, length});
+}
+
+void Surface::blocked(std::span<const Vec3> from, std::span<const Vec3> to,
+                      std::span<std::uint8_t> result) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    alignas(32) int valid[packet_width];
+    alignas(32) RTCRay8 packet;
+    for (std::size_t begin = 0; begin < from.size(); begin += packet_width) {
+        const std::size_t count = std::min(packet_width, from.size() - begin);
+        for (std::size_t k = 0; k < packet_width; ++k) {
+            const std::size_t i = begin + std::min(k, count - 1);
+            const Vec3 step = to[i] - from[i];
+            const float length = step.norm();
+            valid[k] = k < count && length > 0.0f ? -1 : 0;
+            put(packet, k, {from[i], step / length, length});
+        }
+        rtcOccluded8(valid, tree_->scene, &context, &packet);
+        for (std::size_t k = 0; k < count; ++k) result[begin + k] = valid[k] != 0 && packet.tfar[k] < 0.0f;
+    }
 }
 
 Vec3 Surface::geometric_normal(const Hit& hit) const {

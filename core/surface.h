@@ -47,6 +47,10 @@ public:
     bool occluded(const Ray& ray) const;
     /// True where the segment between two points, each already lifted off its surface, is blocked.
     bool blocked(const Vec3& from, const Vec3& to) const;
+    /// The same for many segments at a time, in packets: neighbours should be alike. Three spans of one
+    /// size.
+    void blocked(std::span<const Vec3> from, std::span<const Vec3> to,
+                 std::span<std::uint8_t> result) const;
 
     /// Position from barycentric weights, and the shading normal (interpolated where the scene has
     /// normals) turned to the side the ray came from.

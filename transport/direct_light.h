@@ -4,6 +4,7 @@
 #include "core/surface.h"
 #include "transport/spotlight.h"
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -19,7 +20,9 @@ namespace afterglow {
 /// what is lit, at most the distance) and R the spacing of the senders.
 ///
 /// Where it is many spacings, the first share is *sampled* at the points: rho_j p E(x_j), a shadow ray
-/// each. Where it is few, points could miss what is lit, or its brightest part; the second share is
+/// each. Where the light that is seen, falloff V, differs from a neighbour's by more than a quarter,
+/// an edge of a shadow or of the cone is close, and E is the mean over 8 places within a quarter of
+/// the spacing: so that an edge that moves switches no sender at once. Where s is few spacings, points could miss what is lit, or its brightest part; the second share is
 /// *splatted*: rays leave the light, number k carries the flux Phi_k, and
 ///
 ///     b_j += sum_k rho(y_k) (1 - p) Phi_k B_j(y_k) / <B_j, 1>,
@@ -42,7 +45,21 @@ private:
     std::span<const float> areas_;
     const Surface& surface_;
     ShepardBasis basis_;
+    using Neighbours = std::array<std::uint32_t, 12>; // counted from the level's first; itself if fewer
+    std::vector<Neighbours> neighbours_;             // closest points that face the same side
 
+    /// A sender's share of E(x) that is seen, and what it is of.
+    struct Lit {
+        float sampled = 0.0f; // p
+        float seen = unasked; // falloff V
+    };
+    static constexpr float unasked = -1.0f; // where the light is behind, or only splatted
+
+    void find_neighbours();
+    void sample_points(const Spotlight& light, std::span<Lit> lit, std::span<float> result) const;
+    bool on_edge(std::span<const Lit> lit, std::size_t k) const;
+    /// Mean of E around a point [W/m^2].
+    Rgb mean_irradiance(const Spotlight& light, const Falloff& falloff, Index k) const;
     void sample(const Spotlight& light, std::span<float> result) const;
     void splat(const Spotlight& light, std::span<float> result) const;
 };

@@ -9,9 +9,9 @@
 
 namespace afterglow {
 
-ConeSampler::ConeSampler(const Spotlight& light) : light_(light) {
+ConeSampler::ConeSampler(const Spotlight& light) : axis_(light.direction), falloff_(light) {
     const auto cosine = [](float angle) { return std::cos(angle * EIGEN_PI / 180.0); };
-    // Rounded as in Spotlight::falloff(), which matters for narrow cones.
+    // Rounded as in Falloff, which matters for narrow cones.
     cos_outer_ = static_cast<float>(cosine(light.outer_angle));
     const bool hard = light.inner_angle == light.outer_angle;
     ramp_width_ =
@@ -31,7 +31,7 @@ Vec3 ConeSampler::direction(const Vec2& u) const {
     const double s = std::sqrt(std::max(0.0, (1.0 - c) * (1.0 + c)));
     const double phi = 2.0 * EIGEN_PI * u.y();
     const Eigen::Vector3d local(s * std::cos(phi), s * std::sin(phi), c);
-    return Frame(light_.direction).to_world(local.cast<float>());
+    return Frame(axis_).to_world(local.cast<float>());
 }
 
 float light_vertex_pdf(const ConeSampler& sampler, const Spotlight& light, const Vec3& position,

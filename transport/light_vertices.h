@@ -15,10 +15,11 @@ public:
     explicit ConeSampler(const Spotlight& light);
     Vec3 direction(const Vec2& u) const;
     /// Density [1/sr] of a direction whose cosine to the axis is c.
-    float pdf(float c) const { return light_.falloff(c) * inverse_total_; }
+    float pdf(float c) const { return falloff_(c) * inverse_total_; }
 
 private:
-    Spotlight light_;
+    Vec3 axis_;
+    Falloff falloff_;
     double cos_outer_, ramp_width_,
         ramp_end_;                         // falloff is ((c - cos_outer) / width)^2 below the end
     double ramp_integral_, flat_integral_; // over c

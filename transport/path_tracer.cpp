@@ -41,7 +41,7 @@ struct Path {
 class PathTracer {
 public:
     PathTracer(const Surface& surface, std::span<const Spotlight> lights, PathStrategy strategy)
-        : surface_(surface), lights_(lights) {
+        : surface_(surface), lights_(lights), falloffs_(lights.begin(), lights.end()) {
         if (strategy == PathStrategy::connected)
             for (const Spotlight& light : lights)
                 samplers_.emplace_back(light);
@@ -105,7 +105,7 @@ private:
                                    std::span<Eigen::Array3d> sums) const {
         std::uint64_t rays = 0;
         for (std::size_t l = 0; l < lights_.size(); ++l) {
-            const Rgb unoccluded = unoccluded_irradiance(lights_[l], path.x);
+            const Rgb unoccluded = unoccluded_irradiance(lights_[l], falloffs_[l], path.x);
             if ((unoccluded == 0.0f).all()) continue;
             ++rays;
             if (surface_.blocked(surface_.lifted(path.x), lights_[l].position)) continue;
@@ -157,6 +157,7 @@ private:
 
     const Surface& surface_;
     std::span<const Spotlight> lights_;
+    std::vector<Falloff> falloffs_; // a light each
     std::vector<ConeSampler> samplers_; // one a light; none in plain path tracing
 };
 

@@ -29,25 +29,25 @@ void Spotlight::check() {
         throw UsageError("a spotlight's direction must not be zero");
 }
 
+Falloff::Falloff(const Spotlight& light)
+    : cos_outer_(cos_degrees(light.outer_angle)),
+      // The bound of .001 is the one of KHR_lights_punctual.
+      width_(std::max(0.001f, cos_degrees(light.inner_angle) - cos_outer_)),
+      hard_(light.inner_angle == light.outer_angle) {}
+
 float Spotlight::falloff(float c) const {
-    const float cos_outer = cos_degrees(outer_angle);
-    if (inner_angle == outer_angle) return c >= cos_outer ? 1.0f : 0.0f;
-    if (c <= cos_outer) return 0.0f;
-    // The bound of .001 is the one of KHR_lights_punctual.
-    const float width = std::max(0.001f, cos_degrees(inner_angle) - cos_outer);
-    const float t = std::min(1.0f, (c - cos_outer) / width);
-    return t * t;
+    return Falloff(*this)(c);
 }
 
-Rgb unoccluded_irradiance(const Spotlight& light, const SurfacePoint& x) {
+Rgb unoccluded_irradiance(const Spotlight& light, const Falloff& falloff, const SurfacePoint& x) {
     const Vec3 to_light = light.position - x.position;
     const float squared_distance = to_light.squaredNorm();
     if (!(squared_distance > 0.0f)) return Rgb::Zero();
     const Vec3 direction = to_light / std::sqrt(squared_distance);
     const float cos_surface = direction.dot(x.normal);
     if (cos_surface <= 0.0f) return Rgb::Zero();
-    const float falloff = light.falloff(-direction.dot(light.direction));
-    return light.intensity * (falloff * cos_surface / squared_distance);
+    const float share = falloff(-direction.dot(light.direction));
+    return light.intensity * (share * cos_surface / squared_distance);
 }
 
 Rgb direct_irradiance(const Surface& surface, const Spotlight& light, const SurfacePoint& x) {

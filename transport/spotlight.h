@@ -3,6 +3,8 @@
 #include "core/surface.h"
 #include "core/types.h"
 
+#include <algorithm>
+
 namespace afterglow {
 
 /// The spotlight of glTF KHR_lights_punctual, read radiometrically: a point that sends
@@ -26,8 +28,27 @@ struct Spotlight {
     float falloff(float c) const;
 };
 
+/// Spotlight::falloff of one light, with its cosines at hand: for many c.
+class Falloff {
+public:
+    explicit Falloff(const Spotlight& light);
+    float operator()(float c) const {
+        if (hard_) return c >= cos_outer_ ? 1.0f : 0.0f;
+        if (c <= cos_outer_) return 0.0f;
+        const float t = std::min(1.0f, (c - cos_outer_) / width_);
+        return t * t;
+    }
+
+private:
+    float cos_outer_, width_;
+    bool hard_;
+};
+
 /// E(x) = I falloff cos(theta) / r^2 without visibility [W/m^2], zero where the surface faces away.
-Rgb unoccluded_irradiance(const Spotlight& light, const SurfacePoint& x);
+Rgb unoccluded_irradiance(const Spotlight& light, const Falloff& falloff, const SurfacePoint& x);
+inline Rgb unoccluded_irradiance(const Spotlight& light, const SurfacePoint& x) {
+    return unoccluded_irradiance(light, Falloff(light), x);
+}
 
 /// The same times visibility: one shadow ray where it is not zero already. Reflectance not
 /// included.
