@@ -98,6 +98,8 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
         if (statistics)
             statistics->level.push_back({static_cast<std::uint32_t>(levels[l].size()),
                                          disk.candidates_tried, disk.largest_gap});
+        // A level takes about as long as all before it.
+        if (options.progress) options.progress(std::ldexp(1.0, l + 1 - level_count));
     }
     const Index count = hierarchy.size();
     hierarchy.position.resize(3, count);

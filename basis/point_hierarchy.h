@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -58,6 +59,7 @@ struct HierarchyOptions {
     BasisShape shape = {};
     bool skip_narrow = true; // on every level but an openness level
     std::uint64_t seed = 1;
+    std::function<void(double)> progress = {}; // is told the share of the work that is done
 };
 
 struct LevelStatistics {

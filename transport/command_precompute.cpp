@@ -157,7 +157,11 @@ void run(PrecomputeCommand& command) {
     outer.tree = lap(time);
 
     PrecomputeReport report;
-    const TransferOperator transfer = precompute(surface, command.options, &report);
+    const TransferOperator transfer = [&] {
+        Progress progress("precomputing", !command.run.quiet);
+        command.options.progress = [&](double share) { progress.update(share); };
+        return precompute(surface, command.options, &report);
+    }();
     lap(time);
     const LinkCounts links(transfer);
     const Json options = options_json(command);

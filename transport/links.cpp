@@ -227,6 +227,16 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
     return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
 }
 
+/// Rays of all receivers.
+std::uint64_t rays_of_all(const LinkOptions& options, const PointHierarchy& points) {
+    std::uint64_t rays = 0;
+    for (int l = 0; l < points.levels(); ++l)
+        if (points.leads_to_display(l))
+            rays += static_cast<std::uint64_t>(points.end(l) - points.begin(l))
+                    * static_cast<std::uint64_t>(gather_directions(options, points, l).rays());
+    return rays;
+}
+
 } // namespace
 
 float link_threshold(const LinkOptions& options, const PointHierarchy& points) {
@@ -257,6 +267,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
         [&] { return std::make_unique<RowMaker>(points, push, pull, rows); });
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     statistics.threshold = link_threshold(options, points);
+    const auto all_rays = static_cast<double>(rays_of_all(options, points));
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
@@ -297,6 +308,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
             for (const std::uint64_t count : links_before)
                 statistics.links_before += count;
             statistics.links_seconds += seconds_since(start);
+            if (options.progress) options.progress(static_cast<double>(statistics.rays) / all_rays);
         }
     }
     statistics.patches = rows.made();

@@ -6,6 +6,7 @@
 #include "transport/packed_links.h"
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 namespace afterglow {
@@ -28,6 +29,7 @@ struct LinkOptions {
     std::optional<float> threshold; // where none is given, link_threshold() makes it from
     double target_error = 0.1;      // the relative error that dropped links may make
     std::uint64_t seed = 1;
+    std::function<void(double)> progress = {}; // is told the share of the rays that are done with
 };
 
 struct LinkStatistics {

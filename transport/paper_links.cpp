@@ -162,6 +162,7 @@ RgbLinks make_paper_links(const Surface& surface, const ShepardBasis& basis, int
             statistics.links_before += c.before;
             statistics.rays += c.gathered * static_cast<std::uint64_t>(options.rays);
         }
+        if (options.progress) options.progress(static_cast<double>(points.end(l)) / points.size());
     }
     RgbLinks links = join_rows(std::move(done));
     statistics.links_seconds +=

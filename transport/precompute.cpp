@@ -23,6 +23,8 @@ double seconds_since(Clock::time_point start) {
 /// default levels the finest senders are 1/25 of that length apart.
 constexpr float coarsest_share = 1.28f;
 
+constexpr double points_share = 0.2, push_share = 0.05; // of the time, roughly
+
 /// That spacing times this, 1 or less: so that the display level has at least 30 000 points on open
 /// ground in a scene of few surfaces too.
 float finer_for_few_surfaces(CandidateSource& source, float coarse_radius, int receiver_levels) {
@@ -39,6 +41,8 @@ float finer_for_few_surfaces(CandidateSource& source, float coarse_radius, int r
 HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSource& source) {
     HierarchyOptions hierarchy;
     hierarchy.seed = options.seed;
+    if (options.progress)
+        hierarchy.progress = [&](double share) { options.progress(points_share * share); };
     hierarchy.coarse_radius = options.coarse_radius;
     if (options.coarse_radius == 0.0f) {
         hierarchy.coarse_radius = coarsest_share * static_cast<float>(source.mean_ray_length());
@@ -148,6 +152,10 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
 
     LinkOptions links = options.links;
     links.seed = options.seed;
+    if (options.progress)
+        links.progress = [&](double share) {
+            options.progress(std::lerp(points_share + push_share, 1.0, share));
+        };
     if (options.kind == OperatorKind::paper)
         make_paper(surface, links, transfer, r);
     else

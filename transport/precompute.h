@@ -5,6 +5,7 @@
 #include "transport/transfer_operator.h"
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -26,6 +27,8 @@ struct PrecomputeOptions {
     float openness_density = 0.15f; // of the display level, see DisplayLevel
     float sender_density = 0.3f;   // of the finest regular level
     std::uint64_t seed = 1;
+    /// Is told from time to time which share of the work is done, roughly by time.
+    std::function<void(double)> progress = {};
 
     /// For OperatorKind::paper, as printed [LZT08, secs. 2.3 and 4.2]: three levels of senders, four
     /// bounces, epsilon .025 (of links without our 1/pi). All receivers are on regular levels; of

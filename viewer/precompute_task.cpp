@@ -10,6 +10,8 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <spawn.h>
+#include <stdlib.h>
+#include <string_view>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -35,19 +37,25 @@ std::string program() {
 
 PrecomputeTask::PrecomputeTask(const std::string& scene, const std::string& file)
     : file_(file), start_(now()) {
-    std::array<int, 2> ends{};
-    if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0)
-        throw Error(std::string("no pipe to the precomputation: ") + std::strerror(errno));
+    // A terminal of its own, to which it tells its progress as it would to a person's.
+    const int here = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+    const char* name = here >= 0 && grantpt(here) == 0 && unlockpt(here) == 0 ? ptsname(here) : nullptr;
+    const int there = name ? open(name, O_RDWR | O_NOCTTY | O_CLOEXEC) : -1;
+    if (there < 0) {
+        const std::string why = std::strerror(errno);
+        if (here >= 0) close(here);
+        throw Error("no terminal for the precomputation: " + why);
+    }
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+    posix_spawn_file_actions_adddup2(&actions, there, STDERR_FILENO);
     const std::string path = program();
     const std::array<const char*, 6> words = {path.c_str(), "precompute", scene.c_str(), "-o", file.c_str(), nullptr};
     const int failure = posix_spawnp(&process_, path.c_str(), &actions, nullptr,
                                      const_cast<char**>(words.data()), environ);
     posix_spawn_file_actions_destroy(&actions);
-    close(ends[1]);
-    output_ = ends[0];
+    close(there);
+    output_ = here;
     if (failure != 0) {
         close(output_);
         throw Error("the program " + path + " cannot be started: " + std::strerror(failure));
@@ -67,9 +75,16 @@ double PrecomputeTask::seconds() const { return now() - start_; }
 void PrecomputeTask::read_output() {
     std::array<char, 512> text{};
     for (ssize_t count = 0; (count = read(output_, text.data(), text.size())) > 0;)
-        message_.append(text.data(), static_cast<std::size_t>(count));
-    while (message_.ends_with('\n')) message_.pop_back();
-    if (const auto line = message_.rfind('\n'); line != std::string::npos) message_.erase(0, line + 1);
+        written_.append(text.data(), static_cast<std::size_t>(count));
+    constexpr std::string_view wipe = "\x1b[K"; // of a line that Progress draws again
+    for (std::size_t at = 0; (at = written_.find(wipe)) != std::string::npos;) written_.erase(at, wipe.size());
+    // The last line that says something; what comes after it may not be complete.
+    constexpr std::string_view ends = "\r\n";
+    for (std::size_t end = 0; (end = written_.find_first_of(ends)) != std::string::npos;) {
+        if (end > 0) message_ = written_.substr(0, end);
+        written_.erase(0, end + 1);
+    }
+    if (!written_.empty()) message_ = written_;
 }
 
 PrecomputeTask::State PrecomputeTask::state() {

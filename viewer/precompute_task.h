@@ -27,6 +27,7 @@ public:
 
 private:
     std::string file_, message_;
+    std::string written_; // since the last whole line
     double start_ = 0.0;
     pid_t process_ = -1;
     int output_ = -1;

@@ -4,6 +4,7 @@
 #include "transport/renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <functional>
 #include <string>
@@ -105,6 +106,12 @@ void Renderer::draw_geometry(const Camera& camera, const Vec2& place) {
         targets_.emplace(Targets{camera.width, camera.height, texture(), {}, texture(), {}});
         targets_->direct_framebuffer = make_framebuffer(gl_, {targets_->direct});
         targets_->indirect_framebuffer = make_framebuffer(gl_, {targets_->indirect});
+        // Dark until there is light.
+        const std::array<float, 4> dark = {0.0f, 0.0f, 0.0f, 0.0f};
+        for (const GlName* target : {&targets_->direct_framebuffer, &targets_->indirect_framebuffer}) {
+            gl_.BindFramebuffer(GL_FRAMEBUFFER, *target);
+            gl_.ClearBufferfv(GL_COLOR, 0, dark.data());
+        }
     }
     camera_ = camera;
     place_ = place;

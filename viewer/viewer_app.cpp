@@ -464,8 +464,7 @@ void ViewerApp::draw_precompute_panel() {
     if (!precompute_) return;
     ImGui::Separator();
     ImGui::Text("precomputing %s, %s", precompute_->file().c_str(), duration_text(precompute_->seconds()).c_str());
-    const auto phase = static_cast<float>(precompute_->seconds() - std::floor(precompute_->seconds()));
-    ImGui::ProgressBar(phase, {200.0f, 0.0f}, "");
+    ImGui::TextUnformatted(precompute_->message().c_str());
     ImGui::SameLine();
     if (ImGui::Button("cancel")) {
         precompute_.reset();

@@ -54,7 +54,7 @@ class Window:
     def find(self):
         if self.program.poll() is not None:
             sys.exit(f"the window did not open: {(self.folder / 'stderr').read_text()}")
-        found = subprocess.run(["xdotool", "search", "--name", "Afterglow"], env=self.environment,
+        found = subprocess.run(["xdotool", "search", "--onlyvisible", "--name", "Afterglow"], env=self.environment,
                                capture_output=True, text=True)
         return found.stdout.split("\n")[0]
 
@@ -76,6 +76,10 @@ class Window:
         for k in range(1, 6):
             self.at(*(a + (b - a) * k // 5 for a, b in zip(start, end)))
         self.do("mouseup", button)
+
+    def drop(self, file):
+        subprocess.run([sys.executable, pathlib.Path(__file__).parent / "drop_file.py", self.name, file],
+                       env=self.environment, check=True)
 
     def files(self, pattern):
         return sorted(self.folder.glob(pattern))
@@ -149,9 +153,10 @@ def expect_like_headless(window, file, layer, folder):
 
 
 def run(folder):
-    file = folder / "cornell.afterglow"
-    subprocess.run([afterglow, "precompute", "builtin:cornell", "-o", file, "--rays", "128",
-                    "--receiver-levels", "4", "--sender-levels", "3", "--quiet"], check=True)
+    file, other = folder / "cornell.afterglow", folder / "furnace.afterglow"
+    for scene, output in (("cornell", file), ("furnace:0.5", other)):
+        subprocess.run([afterglow, "precompute", f"builtin:{scene}", "-o", output, "--rays", "128",
+                        "--receiver-levels", "4", "--sender-levels", "3", "--quiet"], check=True)
     with Screen() as screen:
         window = Window(screen, file, folder)
         first = window.makes("F12", "window_*.png").read_bytes()
@@ -230,6 +235,14 @@ def run(folder):
         window.do("windowmap", window.name)
         time.sleep(2)
         expect_like_headless(window, file, "full", folder)
+
+        # Files dropped on it: a damaged one changes nothing, another scene is opened.
+        damaged = folder / "damaged.afterglow"
+        damaged.write_bytes(file.read_bytes()[:10000])
+        window.drop(damaged)
+        expect_like_headless(window, file, "full", folder)
+        window.drop(other)
+        expect_like_headless(window, other, "full", folder)
 
         window.key("Escape")
         status = window.program.wait(timeout=60)
