@@ -68,6 +68,14 @@ void print_text(const TransferFile& file) {
     std::printf("megabytes   %.2f: links %.2f, push %.2f, points %.2f\n", megabytes(""),
                 megabytes("links.") + megabytes("solution."),
                 megabytes("push.") + megabytes("pyramid."), megabytes("points."));
+    const Json statistics = Json::parse(provenance.statistics);
+    if (statistics.contains("verified")) {
+        const Json& verified = statistics["verified"];
+        std::printf("verified    %.1f %% +- %.1f (relRMSE of indirect irradiance at %d places, the worst of %d "
+                    "random spotlights)\n",
+                    100.0 * verified.value("rel_rmse", 0.0), 100.0 * verified.value("standard_error", 0.0),
+                    verified.value("places", 0), verified.value("lights", 0));
+    }
     std::printf("level  functions    spacing       links  links a function\n");
     for (int l = 0; l < transfer.points.levels(); ++l) {
         const std::uint32_t functions = transfer.points.end(l) - transfer.points.begin(l);

@@ -4,15 +4,18 @@
 #include "core/file.h"
 #include "core/parallel.h"
 #include "core/progress.h"
+#include "core/sampling.h"
 #include "transport/cli_options.h"
 #include "transport/precompute.h"
 #include "transport/provenance.h"
 #include "transport/transfer_file.h"
+#include "transport/verification.h"
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -31,12 +34,13 @@ struct PrecomputeCommand {
     std::string scene, output, report, operator_name = "neumann";
     double target_error = LinkOptions().target_error, epsilon = 0.0, coarse_radius = 0.0;
     PrecomputeOptions options;
+    bool no_verification = false;
     RunOptions run;
 };
 
 /// Wall-clock time of what happens around precompute().
 struct OuterSeconds {
-    double load = 0.0, tree = 0.0, write = 0.0, total = 0.0;
+    double load = 0.0, tree = 0.0, verification = 0.0, write = 0.0, total = 0.0;
 };
 
 /// Stored links, counted once: it takes a pass over them.
@@ -56,6 +60,13 @@ struct LinkCounts {
 double lap(Clock::time_point& start) {
     const Clock::time_point before = std::exchange(start, Clock::now());
     return std::chrono::duration<double>(start - before).count();
+}
+
+/// To four digits: more of an error's estimate say nothing.
+double rounded(double value) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.4g", value);
+    return std::stod(text.data());
 }
 
 Json vector_json(const Vec3& v) {
@@ -81,7 +92,7 @@ Json options_json(const PrecomputeCommand& command) {
 
 /// Counts and measures of length: nothing that differs from run to run.
 Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& report,
-                     const LinkCounts& links) {
+                     const LinkCounts& links, const VerifiedError& verified) {
     Json viewpoints = Json::array(), levels = Json::array();
     for (const Vec3& viewpoint : report.viewpoints)
         viewpoints.push_back(vector_json(viewpoint));
@@ -92,7 +103,7 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
                           {"largest_gap", level.largest_gap},
                           {"links", links.level[static_cast<std::size_t>(l)]}});
     }
-    return {{"viewpoints", viewpoints},
+    Json json = {{"viewpoints", viewpoints},
             {"mean_ray_length", report.mean_ray_length},
             {"levels", levels},
             {"senders", transfer.senders()},
@@ -103,6 +114,27 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
             {"rays_of_links", report.links.rays},
             {"patch_rows", report.links.patches},
             {"uncovered_patch_rows", report.links.uncovered_patches}};
+    if (verified.any())
+        json["verified"] = {{"rel_rmse", rounded(verified.rel_rmse)},
+                            {"standard_error", rounded(verified.standard_error)},
+                            {"bias", rounded(verified.bias)},
+                            {"reference_error", rounded(verified.reference_error)},
+                            {"places", verified.places},
+                            {"lights", verified.lights}};
+    return json;
+}
+
+/// On its own, with other places and lights for each seed than anything else has.
+VerifiedError verified_error(const Surface& surface, const TransferOperator& transfer,
+                             const PrecomputeReport& report, const PrecomputeOptions& options) {
+    constexpr double share_of_rays = 0.2; // a tenth of the time
+    const LightTransport transport(transfer, surface);
+    const Display display(transfer, surface);
+    VerificationOptions verification;
+    verification.seed = hash64(options.seed, 0x7e41f);
+    verification.most_rays = static_cast<std::uint64_t>(
+        share_of_rays * static_cast<double>(report.links.rays + report.points_rays));
+    return verify(transport, display, surface, report.viewpoints, verification);
 }
 
 Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
@@ -115,6 +147,7 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
             {"rows", report.links.rows_seconds},
             {"links", report.links.links_seconds},
             {"series", report.series_seconds},
+            {"verification", outer.verification},
             {"precompute", report.total_seconds},
             {"write", outer.write},
             {"total", outer.total}};
@@ -122,7 +155,7 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
 
 void print_results(const PrecomputeCommand& command, const TransferOperator& transfer,
                    const PrecomputeReport& report, const LinkCounts& links,
-                   const OuterSeconds& outer) {
+                   const VerifiedError& verified, const OuterSeconds& outer) {
     const auto say = [](const char* format, auto... values) {
         std::fprintf(stderr, format, values...);
     };
@@ -140,6 +173,11 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
         duration_text(outer.total).c_str());
+    if (verified.any())
+        say("verified error %.1f %% +- %.1f (relRMSE of indirect irradiance at %d places, the worst of %d "
+            "random spotlights)\n",
+            100.0 * verified.rel_rmse, 100.0 * verified.standard_error, verified.places,
+            verified.lights);
 }
 
 void run(PrecomputeCommand& command) {
@@ -163,9 +201,12 @@ void run(PrecomputeCommand& command) {
         return precompute(surface, command.options, &report);
     }();
     lap(time);
+    VerifiedError verified;
+    if (!command.no_verification) verified = verified_error(surface, transfer, report, command.options);
+    outer.verification = lap(time);
     const LinkCounts links(transfer);
     const Json options = options_json(command);
-    const Json statistics = statistics_json(transfer, report, links);
+    const Json statistics = statistics_json(transfer, report, links, verified);
     const std::string hash = scene.content_hash();
     save_transfer(command.output, transfer,
                   {AFTERGLOW_VERSION, command.scene, hash, command.options.seed, options.dump(),
@@ -185,7 +226,7 @@ void run(PrecomputeCommand& command) {
                            {"seconds", seconds_json(report, outer)}};
         write_file(command.report, json.dump(1) + "\n");
     }
-    if (!command.run.quiet) print_results(command, transfer, report, links, outer);
+    if (!command.run.quiet) print_results(command, transfer, report, links, verified, outer);
 }
 
 /// Turns what was typed into PrecomputeOptions; throws UsageError for what cannot be.
@@ -258,6 +299,8 @@ void add_precompute_command(CLI::App& app) {
     sub->add_option("--bounces", command->options.bounces,
                     "Bounces of indirect light (default 0: all; of --operator paper 4)")
         ->check(CLI::Range(0, most_bounces));
+    sub->add_flag("--no-verification", command->no_verification,
+                  "Do not compare with the path tracer in the end");
     sub->add_option("--report", command->report, "JSON file for counts and times");
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);

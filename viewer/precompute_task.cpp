@@ -6,11 +6,11 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
 #include <spawn.h>
-#include <stdlib.h>
 #include <string_view>
 #include <sys/wait.h>
 #include <unistd.h>

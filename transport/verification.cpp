@@ -1,0 +1,171 @@
+#include "transport/verification.h"
+
+#include "basis/candidates.h"
+#include "core/sampling.h"
+#include "transport/path_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+namespace afterglow {
+namespace {
+
+/// Places in the open where light passes: on the way from a place that particles reach to the next
+/// surface, and not in a gap or close to a wall. A lamp can be there, and an eye.
+class FreePlaces {
+public:
+    FreePlaces(const Surface& surface, const std::vector<Vec3>& viewpoints, std::uint64_t seed)
+        : surface_(surface), source_(surface, viewpoints, seed), rng_(seed, 0xf4ee) {}
+
+    Vec3 next() {
+        // Where nothing is open, as in a crack, the last will do.
+        Vec3 place = draw();
+        for (int tries = 0; tries < 100 && !is_open(place); ++tries) place = draw();
+        return place;
+    }
+    float uniform() { return rng_.uniform(); }
+    Vec2 uniform2() {
+        const float u = rng_.uniform();
+        return {u, rng_.uniform()};
+    }
+
+private:
+    const Surface& surface_;
+    CandidateSource source_;
+    Rng rng_;
+    std::size_t candidate_ = 0;
+
+    Vec3 draw() {
+        source_.ensure(candidate_ + 1);
+        const SurfacePoint x = source_[candidate_].at;
+        candidate_ += 97; // not the next vertex of the same path
+        const Ray ray{surface_.lifted(x), Frame(x.normal).to_world(sample_cosine(uniform2()))};
+        const Hit hit = surface_.closest_hit(ray);
+        const auto longest = 2.0f * static_cast<float>(source_.mean_ray_length());
+        const float length = hit ? std::min(hit.distance, longest) : longest;
+        return ray.origin + (0.25f + 0.5f * rng_.uniform()) * length * ray.direction;
+    }
+
+    /// Whether the harmonic mean of the distances around is a quarter of what light travels here.
+    bool is_open(const Vec3& place) const {
+        constexpr std::uint32_t rays = 64;
+        double inverse = 0.0;
+        for (std::uint32_t k = 0; k < rays; ++k)
+            if (const Hit hit = surface_.closest_hit({place, sample_sphere(scrambled_sobol2(k, 5))}))
+                inverse += 1.0 / hit.distance;
+        return rays > inverse * source_.mean_ray_length() / 4.0;
+    }
+};
+
+Spotlight random_spotlight(const Surface& surface, FreePlaces& free) {
+    Spotlight light;
+    light.position = free.next();
+    float farthest = -1.0f;
+    for (int k = 0; k < 2; ++k) {
+        const Vec3 direction = sample_sphere(free.uniform2());
+        const Hit hit = surface.closest_hit({light.position, direction});
+        if (const float far = hit ? hit.distance : 0.0f; far > farthest) {
+            farthest = far;
+            light.direction = direction;
+        }
+    }
+    light.outer_angle = 20.0f + 30.0f * free.uniform();
+    light.inner_angle = light.outer_angle - 5.0f;
+    light.check();
+    return light;
+}
+
+double mean_square(const Eigen::Array3Xf& a) { return a.cast<double>().square().mean(); }
+
+} // namespace
+
+Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
+                   std::uint64_t seed) {
+    FreePlaces free(surface, viewpoints, seed);
+    Trial trial;
+    std::vector<Vec3> eyes;
+    for (int l = 0; l < lights; ++l) {
+        trial.lights.push_back(random_spotlight(surface, free));
+        eyes.push_back(trial.lights.back().position);
+        eyes.push_back(free.next());
+    }
+    for (std::uint32_t k = 0; static_cast<int>(trial.places.size()) < places; ++k) {
+        if (k >= 100u * static_cast<std::uint32_t>(places)) return {};
+        const Vec3& eye = eyes[k % eyes.size()];
+        const Vec3 direction = sample_sphere(scrambled_sobol2(k, hash64(seed, 0x9147)));
+        if (const Hit hit = surface.closest_hit({eye, direction})) trial.places.push_back(surface.point(hit));
+    }
+    return trial;
+}
+
+VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::Array3Xf& reference,
+                                     const Eigen::Array3Xf& standard_error) {
+    constexpr Index groups = 20;
+    const Index places = found.cols();
+    const double mean = reference.cast<double>().mean();
+    // Of each place: its squared error, without what the reference's variance adds on average.
+    const Eigen::ArrayXd square =
+        ((found - reference).cast<double>().square() - standard_error.cast<double>().square())
+            .colwise().mean().transpose();
+    const auto rel_rmse = [&](double sum, Index count) {
+        return std::sqrt(std::max(0.0, sum / static_cast<double>(count))) / mean;
+    };
+    VerifiedError error;
+    error.places = static_cast<int>(places);
+    error.rel_rmse = rel_rmse(square.sum(), places);
+    error.bias = found.cast<double>().mean() / mean - 1.0;
+    error.reference_error = std::sqrt(mean_square(standard_error)) / mean;
+    double spread = 0.0, centre = 0.0;
+    std::array<double, groups> without;
+    for (Index g = 0; g < groups; ++g) {
+        double sum = square.sum();
+        Index count = places;
+        for (Index k = g; k < places; k += groups) {
+            sum -= square[k];
+            --count;
+        }
+        without[static_cast<std::size_t>(g)] = rel_rmse(sum, count);
+        centre += without[static_cast<std::size_t>(g)] / groups;
+    }
+    for (const double w : without) spread += (w - centre) * (w - centre);
+    error.standard_error = std::sqrt(spread * (groups - 1.0) / groups);
+    return error;
+}
+
+VerifiedError verify(const LightTransport& transport, const Display& display, const Surface& surface,
+                     const std::vector<Vec3>& viewpoints, const VerificationOptions& options) {
+    const auto start = std::chrono::steady_clock::now();
+    const Trial trial = random_trial(surface, viewpoints, options.lights, options.places, options.seed);
+    if (trial.places.empty()) return {};
+
+    constexpr double rays_of_path = 40.0; // shadow rays and connections to three lights included
+    PathTracerOptions tracer;
+    tracer.strategy = PathStrategy::connected;
+    tracer.seed = options.seed;
+    tracer.target_error = options.reference_error;
+    tracer.max_samples = std::max<Index>(
+        tracer.batches, static_cast<Index>(static_cast<double>(options.most_rays) / (rays_of_path * options.places)));
+    const IrradianceEstimate reference = estimate_irradiance(surface, trial.lights, trial.places, tracer);
+
+    const auto lights = static_cast<Index>(trial.lights.size());
+    const auto places = static_cast<Index>(trial.places.size());
+    VerifiedError worst;
+    for (Index l = 0; l < lights; ++l) {
+        const auto of_light = Eigen::seqN(l, places, lights);
+        const Eigen::Array3Xf indirect = reference.indirect(Eigen::all, of_light);
+        if (!(indirect > 0.0f).any()) continue; // a light that shines out of the scene
+        const Eigen::Array3Xf found =
+            display.irradiance(trial.places, transport.indirect(trial.lights[static_cast<std::size_t>(l)]));
+        const VerifiedError error =
+            compare_with_reference(found, indirect, reference.standard_error(Eigen::all, of_light));
+        if (!worst.any() || error.rel_rmse > worst.rel_rmse) worst = error;
+    }
+    worst.lights = static_cast<int>(lights);
+    worst.rays = reference.rays;
+    worst.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return worst;
+}
+
+} // namespace afterglow

@@ -1,0 +1,54 @@
+#pragma once
+
+#include "core/surface.h"
+#include "transport/display.h"
+#include "transport/spotlight.h"
+#include "transport/transfer_operator.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace afterglow {
+
+/// Lights and places as a person may choose them, to try an operator on.
+struct Trial {
+    std::vector<Spotlight> lights;
+    std::vector<SurfacePoint> places;
+};
+
+/// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the
+/// distances around is at least a quarter of the typical ray length; they shine at what is farther of
+/// two random directions. Places are in sight of these and of as many other places in the open. Empty where the scene has nothing to be seen. `viewpoints` as from find_viewpoints().
+Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
+                   std::uint64_t seed);
+
+struct VerificationOptions {
+    int lights = 3;
+    int places = 1000;
+    double reference_error = 0.03;      // relative, that the path tracer shall reach
+    std::uint64_t most_rays = 10'000'000; // that it takes, about
+    std::uint64_t seed = 1;
+};
+
+/// How far an operator is from the path tracer: of the light of the trial under which it is worst.
+struct VerifiedError {
+    double rel_rmse = 0.0;       // of indirect irradiance, the path tracer's own variance taken out
+    double standard_error = 0.0; // of rel_rmse, over the choice of places (jackknife of 20 groups)
+    double bias = 0.0;           // mean error over mean
+    double reference_error = 0.0;
+    int lights = 0, places = 0;
+    std::uint64_t rays = 0;
+    double seconds = 0.0;
+    bool any() const { return places > 0; }
+};
+
+/// Compares with places and lights that depend on the seed and the scene alone.
+VerifiedError verify(const LightTransport& transport, const Display& display, const Surface& surface,
+                     const std::vector<Vec3>& viewpoints, const VerificationOptions& options);
+
+/// The same for one light of a trial, of which the reference is known: 3 x places each [W/m^2].
+VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::Array3Xf& reference,
+                                     const Eigen::Array3Xf& standard_error);
+
+} // namespace afterglow
