@@ -76,6 +76,32 @@ TEST(Precompute, StaysInSightOfAGivenViewpoint) {
     EXPECT_GT(both.points.position.row(0).maxCoeff(), 7.0f);
 }
 
+TEST(Precompute, FewRaysMakeNeitherLightNorLinks) {
+    const Scene scene = make_builtin_scene("builtin:cornell");
+    const Surface surface(scene);
+    Spotlight light{.position = Vec3(0.278f, 0.5f, 0.2795f), .inner_angle = 30.0f, .outer_angle = 35.0f};
+    light.check();
+    std::uint64_t links[2];
+    double mean[2]; // of indirect irradiance
+    for (const int k : {0, 1}) {
+        PrecomputeOptions options;
+        options.receiver_levels = 5;
+        options.sender_levels = 4;
+        options.links.rays = k == 0 ? 64 : 1024;
+        const TransferOperator transfer = precompute(surface, options);
+        const VectorIrradiance field = LightTransport(transfer, surface).indirect(light);
+        links[k] = transfer.link_count();
+        mean[k] = 0.0;
+        const PointHierarchy& points = transfer.points;
+        for (std::uint32_t i = points.begin(4); i < points.end(4); ++i)
+            for (int a = 0; a < 3; ++a)
+                for (int c = 0; c < 3; ++c)
+                    mean[k] += static_cast<double>(points.normal(a, i) * field[9 * std::size_t{i} + 3 * a + c]);
+    }
+    EXPECT_NEAR(mean[0] / mean[1], 1.0, 0.01);
+    EXPECT_LT(static_cast<double>(links[0]), 1.5 * static_cast<double>(links[1]));
+}
+
 TEST(Precompute, RefusesImpossibleOptions) {
     const Scene scene = make_builtin_scene("builtin:furnace");
     const Surface surface(scene);
