@@ -87,7 +87,7 @@ TEST(Precompute, FewRaysMakeNeitherLightNorLinks) {
         PrecomputeOptions options;
         options.receiver_levels = 5;
         options.sender_levels = 4;
-        options.links.rays = k == 0 ? 64 : 1024;
+        options.links.rays = k == 0 ? 64 : 512;
         const TransferOperator transfer = precompute(surface, options);
         const VectorIrradiance field = LightTransport(transfer, surface).indirect(light);
         links[k] = transfer.link_count();
