@@ -195,6 +195,11 @@ private:
     std::vector<Coarsest> coarsest_;
 };
 
+/// Of what a ray of mean density adds: links below are taken for noise. The differences of single rays
+/// are few large ones on one side and many small ones on the other, so that a threshold that only the
+/// large ones exceed adds light (14 % at 128 rays); and one above what a ray adds loses some.
+constexpr float least_share_of_a_ray = 0.8f;
+
 /// smallest: that any link to a finer sender may be, see LinkOptions.
 LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, int sender_levels,
                                  int level, float smallest) {
@@ -228,11 +233,6 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
     }
     return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
 }
-
-/// Of what a ray of mean density adds: links below are taken for noise. The differences of single rays
-/// are few large ones on one side and many small ones on the other, so that a threshold that only the
-/// large ones exceed adds light (14 % at 128 rays); and one above what a ray adds loses some.
-constexpr float least_share_of_a_ray = 0.8f;
 
 /// Rays of all receivers.
 std::uint64_t rays_of_all(const LinkOptions& options, const PointHierarchy& points) {
@@ -278,10 +278,11 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
+        const bool noisy = !options.threshold && options.rays < LinkOptions().rays;
         const float of_one_ray = 2.0f / static_cast<float>(directions.rays());
         const LevelThresholds thresholds =
             level_thresholds(statistics.threshold, points, rows.levels(), l,
-                             options.threshold ? 0.0f : least_share_of_a_ray * of_one_ray);
+                             noisy ? least_share_of_a_ray * of_one_ray : 0.0f);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());

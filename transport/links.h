@@ -26,8 +26,8 @@ struct LinkOptions {
     /// the display level loses stays where it is, and its links are the noisiest.
     /// Senders: coefficients on level k are of shadow edges, which cross a share of the functions
     /// that goes like R_k, so that their root mean square goes like R_k^(1/2).
-    /// Where it is not given, links to all but the coarsest senders must also exceed 0.8 of what one of
-    /// the receiver's N rays adds, 2 / N on average: what single rays make is noise.
+    /// Where it is not given and there are fewer than 512 rays, links to all but the coarsest senders must
+    /// also exceed 0.8 of what one of the receiver's N rays adds, 2 / N on average: single rays are noise.
     std::optional<float> threshold; // where none is given, link_threshold() makes it from
     double target_error = 0.1;      // the relative error that dropped links may make
     std::uint64_t seed = 1;
