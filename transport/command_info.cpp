@@ -1,6 +1,7 @@
 #include "transport/command_info.h"
 
 #include "transport/transfer_file.h"
+#include "transport/verification.h"
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -70,11 +71,13 @@ void print_text(const TransferFile& file) {
                 megabytes("push.") + megabytes("pyramid."), megabytes("points."));
     const Json statistics = Json::parse(provenance.statistics);
     if (statistics.contains("verified")) {
-        const Json& verified = statistics["verified"];
-        std::printf("verified    %.1f %% +- %.1f (relRMSE of indirect irradiance at %d places, the worst of %d "
-                    "random spotlights)\n",
-                    100.0 * verified.value("rel_rmse", 0.0), 100.0 * verified.value("standard_error", 0.0),
-                    verified.value("places", 0), verified.value("lights", 0));
+        const Json& json = statistics["verified"];
+        VerifiedError verified;
+        verified.rel_rmse = json.value("rel_rmse", 0.0);
+        verified.standard_error = json.value("standard_error", 0.0);
+        verified.places = json.value("places", 0);
+        verified.lights = json.value("lights", 0);
+        std::printf("verified    %s\n", verified.text().c_str());
     }
     std::printf("level  functions    spacing       links  links a function\n");
     for (int l = 0; l < transfer.points.levels(); ++l) {

@@ -173,11 +173,7 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
         duration_text(outer.total).c_str());
-    if (verified.any())
-        say("verified error %.1f %% +- %.1f (relRMSE of indirect irradiance at %d places, the worst of %d "
-            "random spotlights)\n",
-            100.0 * verified.rel_rmse, 100.0 * verified.standard_error, verified.places,
-            verified.lights);
+    if (verified.any()) say("verified error %s\n", verified.text().c_str());
 }
 
 void run(PrecomputeCommand& command) {

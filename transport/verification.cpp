@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 
 namespace afterglow {
 namespace {
@@ -98,6 +99,14 @@ Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, 
         if (const Hit hit = surface.closest_hit({eye, direction})) trial.places.push_back(surface.point(hit));
     }
     return trial;
+}
+
+std::string VerifiedError::text() const {
+    std::array<char, 200> line{};
+    std::snprintf(line.data(), line.size(),
+                  "%.1f %% +- %.1f (relRMSE of indirect irradiance at %d places, the worst of %d random spotlights)",
+                  100.0 * rel_rmse, 100.0 * standard_error, places, lights);
+    return line.data();
 }
 
 VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::Array3Xf& reference,

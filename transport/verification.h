@@ -6,7 +6,7 @@
 #include "transport/transfer_operator.h"
 
 #include <cstdint>
-#include <span>
+#include <string>
 #include <vector>
 
 namespace afterglow {
@@ -41,6 +41,8 @@ struct VerifiedError {
     std::uint64_t rays = 0;
     double seconds = 0.0;
     bool any() const { return places > 0; }
+    /// For a person, in one line.
+    std::string text() const;
 };
 
 /// Compares with places and lights that depend on the seed and the scene alone.
