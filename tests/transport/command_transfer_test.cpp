@@ -202,9 +202,15 @@ TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
     EXPECT_EQ(json.status, 0) << json.err;
     EXPECT_EQ(json.out.find('\n'), json.out.size() - 1);
     for (const char* key : {"\"levels\":[{", "\"functions\":", "\"links\":", "\"bytes\":{",
-                            "\"options\":{", "\"scene_hash\":", "\"largest_gap\":"})
+                            "\"options\":{", "\"scene_hash\":", "\"largest_gap\":",
+                            "\"verified\":{\"rel_rmse\":"})
         EXPECT_NE(json.out.find(key), std::string::npos) << key;
+    EXPECT_NE(text.out.find("\nverified    "), std::string::npos) << text.out;
     EXPECT_EQ(text.err + json.err, "");
+
+    const std::string path = folder.path("t");
+    run("precompute builtin:cornell --no-verification -o" + quoted(path) + small_settings);
+    EXPECT_EQ(run("info" + quoted(path)).out.find("verified"), std::string::npos);
 }
 
 TEST_F(CommandTransfer, ThePapersOperatorServesAllCommands) {
