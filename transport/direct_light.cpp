@@ -1,5 +1,6 @@
 #include "transport/direct_light.h"
 
+#include "basis/nearest_points.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
 #include "transport/sender_rows.h"

@@ -234,13 +234,23 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
     return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
 }
 
+/// Of a receiver of a level.
+int gather_rays(const LinkOptions& options, const PointHierarchy& points, int level) {
+    const float coarser = std::log2(points.spacing[level] / points.spacing.back());
+    const int doublings = static_cast<int>(1.5f * std::max(0.0f, coarser) + 0.01f);
+    int rays = options.rays;
+    for (int k = 0; k < doublings && rays < options.most_rays; ++k)
+        rays *= 2;
+    return rays;
+}
+
 /// Rays of all receivers.
 std::uint64_t rays_of_all(const LinkOptions& options, const PointHierarchy& points) {
     std::uint64_t rays = 0;
     for (int l = 0; l < points.levels(); ++l)
         if (points.leads_to_display(l))
             rays += static_cast<std::uint64_t>(points.end(l) - points.begin(l))
-                    * static_cast<std::uint64_t>(gather_directions(options, points, l).rays());
+                    * static_cast<std::uint64_t>(gather_rays(options, points, l));
     return rays;
 }
 
@@ -254,12 +264,7 @@ float link_threshold(const LinkOptions& options, const PointHierarchy& points) {
 
 GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,
                                    int level) {
-    const float coarser = std::log2(points.spacing[level] / points.spacing.back());
-    const int doublings = static_cast<int>(1.5f * std::max(0.0f, coarser) + 0.01f);
-    int rays = options.rays;
-    for (int k = 0; k < doublings && rays < options.most_rays; ++k)
-        rays *= 2;
-    return {rays, hash64(options.seed, static_cast<std::uint64_t>(level))};
+    return {gather_rays(options, points, level), hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
 
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,

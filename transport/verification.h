@@ -19,14 +19,15 @@ struct Trial {
 
 /// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the
 /// distances around is at least a quarter of the typical ray length; they shine at what is farther of
-/// two random directions. Places are in sight of these and of as many other places in the open. Empty where the scene has nothing to be seen. `viewpoints` as from find_viewpoints().
+/// two random directions. Places are in sight of these and of as many other places in the open. Empty
+/// where hardly anything is in sight. `viewpoints` as from find_viewpoints().
 Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
                    std::uint64_t seed);
 
 struct VerificationOptions {
     int lights = 3;
     int places = 1000;
-    double reference_error = 0.03;      // relative, that the path tracer shall reach
+    double reference_error = 0.03;        // relative, that the path tracer shall reach
     std::uint64_t most_rays = 10'000'000; // that it takes, about
     std::uint64_t seed = 1;
 };
@@ -38,8 +39,6 @@ struct VerifiedError {
     double bias = 0.0;           // mean error over mean
     double reference_error = 0.0;
     int lights = 0, places = 0;
-    std::uint64_t rays = 0;
-    double seconds = 0.0;
     bool any() const { return places > 0; }
     /// For a person, in one line.
     std::string text() const;
