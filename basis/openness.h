@@ -53,10 +53,14 @@ inline float openness_likeness(float difference2) {
     return std::exp(difference2 * (-1.0f / (0.15f * 0.15f)));
 }
 
-/// Whether a point sees hardly anything that is farther than a few spacings, as under a carpet:
-/// n . F < 0.1 for the longest distance.
+/// What a point sees of all that is farther than a few spacings, n . F for the longest distance: 1 on
+/// open ground.
+inline float far_openness(const Vec3& normal, const Openness& openness) {
+    return 1.0f + normal.dot(openness.tail<3>());
+}
+/// Whether that is hardly anything, as under a carpet.
 inline bool is_enclosed(const Vec3& normal, const Openness& openness) {
-    return 1.0f + normal.dot(openness.tail<3>()) < 0.1f;
+    return far_openness(normal, openness) < 0.1f;
 }
 
 } // namespace afterglow

@@ -53,13 +53,18 @@ bool ShepardBasis::wall_between(int level, const SurfacePoint& x, float lift_of_
                             points_.position.col(j) + lift_of_j * points_.normal.col(j));
 }
 
-bool ShepardBasis::roofed(int level, const SurfacePoint& x) const {
-    return surface_.occluded({surface_.lifted(x), x.normal, 0.5f * points_.spacing[level]});
+bool ShepardBasis::roofed(int level, const SurfacePoint& x, float spacings) const {
+    return surface_.occluded({surface_.lifted(x), x.normal, spacings * points_.spacing[level]});
 }
 
 bool ShepardBasis::enclosed(int level, const SurfacePoint& x) const {
-    if (level < points_.openness_level || !roofed(level, x)) return false;
+    if (level < points_.openness_level || !roofed(level, x, 0.5f)) return false;
     return is_enclosed(x.normal, (*level_[level]->probe)(x));
+}
+
+bool ShepardBasis::in_gap(int level, const SurfacePoint& x) const {
+    if (level < points_.openness_level || !roofed(level, x)) return false;
+    return far_openness(x.normal, (*level_[level]->probe)(x)) < 0.5f;
 }
 
 float ShepardBasis::weight(const SurfacePoint& x, std::uint32_t j, float reach) const {
@@ -115,7 +120,7 @@ bool ShepardBasis::favour_equal_openness(int level, const SurfacePoint& x,
         return openness_likeness(openness_difference2(points_.openness_of(entry.index), any)) > 0.98f;
     });
     // Unless x lies in a gap that none of them lies in.
-    if (alike && !roofed(level, x)) return true;
+    if (alike && !roofed(level, x, 0.5f)) return true;
     const Openness here = (*level_[level]->probe)(x);
     float most_alike = 0.0f;
     for (BasisEntry& entry : row) {
@@ -192,18 +197,29 @@ void ShepardBasis::apply_factors(std::span<const BasisEntry> factors, const Surf
 bool ShepardBasis::take_nearest(int level, const SurfacePoint& x, std::size_t first,
                                 std::vector<BasisEntry>& row) const {
     if (row.size() == first && enclosed(level, x)) return false;
-    std::vector<std::uint32_t> near;
+    const std::size_t before = row.size();
+    if (!closest_in_sight(level, x, row)) return false;
+    row.erase(row.begin() + static_cast<std::ptrdiff_t>(first),
+              row.begin() + static_cast<std::ptrdiff_t>(before));
+    return true;
+}
+
+bool ShepardBasis::closest_in_sight(int level, const SurfacePoint& x,
+                                    std::vector<BasisEntry>& row) const {
+    thread_local std::vector<std::uint32_t> near;
     const float farthest = 4.0f * points_.spacing[level];
     const float lift = see_walls_ ? free_lift(x, level_[level]->highest_lift) : 0.0f;
-    level_[level]->nearest->closest(x.position, 32, near);
-    for (const std::uint32_t k : near) {
-        const std::uint32_t j = points_.begin(level) + k;
-        if ((x.position - points_.position.col(j)).norm() > farthest) break; // closest first
-        if (x.normal.dot(points_.normal.col(j)) <= 0.1f) continue;
-        if (see_walls_ && wall_between(level, x, lift, j)) continue;
-        row.resize(first);
-        row.push_back({j, 1.0f});
-        return true;
+    std::size_t looked_at = 0;
+    for (const int count : {4, 32}) { // four mostly do
+        level_[level]->nearest->closest(x.position, count, near);
+        for (; looked_at < near.size(); ++looked_at) {
+            const std::uint32_t j = points_.begin(level) + near[looked_at];
+            if ((x.position - points_.position.col(j)).norm() > farthest) return false; // closest first
+            if (x.normal.dot(points_.normal.col(j)) <= 0.1f) continue;
+            if (see_walls_ && wall_between(level, x, lift, j)) continue;
+            row.push_back({j, 1.0f});
+            return true;
+        }
     }
     return false;
 }

@@ -42,9 +42,16 @@ public:
     /// Appends the functions of one level with B_j(x) > 0, by increasing id; they sum to 1, or there
     /// are none where the level does not cover x.
     void evaluate(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
-    /// Whether x sees hardly anything that is farther than a few spacings, n . F < 0.1 for the longest
-    /// distance of the openness feature; false on levels without.
+    /// Whether is_enclosed() holds at x; false on levels without openness.
     bool enclosed(int level, const SurfacePoint& x) const;
+    /// Whether something lies within so many spacings above x.
+    bool roofed(int level, const SurfacePoint& x, float spacings = 2.0f) const;
+    /// Of the functions within four spacings that face the same side as x, the closest that is not
+    /// behind a wall, with the share 1; none where there is none.
+    bool closest_in_sight(int level, const SurfacePoint& x, std::vector<BasisEntry>& row) const;
+    /// Whether x lies in a gap that functions cannot resolve: something stands within two spacings above
+    /// it, and far_openness() < 0.5; false on levels without openness.
+    bool in_gap(int level, const SurfacePoint& x) const;
     /// As evaluate; where the level does not cover x, or not with functions in sight, the closest
     /// function within four times its spacing that faces the same side and is not behind a wall gets
     /// all the weight, if there is one; none where x is enclosed.
@@ -89,8 +96,6 @@ private:
     /// `enough`: whether functions in sight decide.
     std::size_t hide_behind_walls(int level, const SurfacePoint& x, std::span<BasisEntry> row,
                                   bool& enough) const;
-    /// Whether something lies within half a spacing above x.
-    bool roofed(int level, const SurfacePoint& x) const;
     /// How high over x to look for walls: `wanted`, or half way to what is closer above it.
     float free_lift(const SurfacePoint& x, float wanted) const;
     bool wall_between(int level, const SurfacePoint& x, float lift_of_x, std::uint32_t j) const;

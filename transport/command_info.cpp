@@ -75,6 +75,7 @@ void print_text(const TransferFile& file) {
         VerifiedError verified;
         verified.rel_rmse = json.value("rel_rmse", 0.0);
         verified.standard_error = json.value("standard_error", 0.0);
+        verified.worst = json.value("worst", 0.0);
         verified.places = json.value("places", 0);
         verified.lights = json.value("lights", 0);
         std::printf("verified    %s\n", verified.text().c_str());

@@ -9,6 +9,7 @@
 #include "transport/precompute.h"
 #include "transport/provenance.h"
 #include "transport/transfer_file.h"
+#include "transport/tuning.h"
 #include "transport/verification.h"
 
 #include <CLI/CLI.hpp>
@@ -22,6 +23,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace afterglow {
@@ -30,11 +32,15 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
+constexpr float draft_scale = 3.0f;
+constexpr int draft_rays = 128;
+
 struct PrecomputeCommand {
     std::string scene, output, report, operator_name = "neumann";
     double target_error = LinkOptions().target_error, epsilon = 0.0, coarse_radius = 0.0;
+    double max_time = 0.0, max_memory = 0.0; // [s], [GB]; 0: no limit
     PrecomputeOptions options;
-    bool no_verification = false;
+    bool draft = false, tuned = false, no_verification = false;
     RunOptions run;
 };
 
@@ -92,7 +98,8 @@ Json options_json(const PrecomputeCommand& command) {
 
 /// Counts and measures of length: nothing that differs from run to run.
 Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& report,
-                     const LinkCounts& links, const VerifiedError& verified) {
+                     const LinkCounts& links, const VerifiedError& verified,
+                     const TuningReport& tuning) {
     Json viewpoints = Json::array(), levels = Json::array();
     for (const Vec3& viewpoint : report.viewpoints)
         viewpoints.push_back(vector_json(viewpoint));
@@ -117,24 +124,25 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
     if (verified.any())
         json["verified"] = {{"rel_rmse", rounded(verified.rel_rmse)},
                             {"standard_error", rounded(verified.standard_error)},
+                            {"worst", rounded(verified.worst)},
                             {"bias", rounded(verified.bias)},
                             {"reference_error", rounded(verified.reference_error)},
                             {"places", verified.places},
                             {"lights", verified.lights}};
+    for (const TuningStep& step : tuning.steps)
+        json["tuning"].push_back({{"coarse_scale", rounded(step.coarse_scale)},
+                                  {"rel_rmse", rounded(step.error.rel_rmse)},
+                                  {"standard_error", rounded(step.error.standard_error)}});
     return json;
 }
 
 /// On its own, with other places and lights for each seed than anything else has.
 VerifiedError verified_error(const Surface& surface, const TransferOperator& transfer,
                              const PrecomputeReport& report, const PrecomputeOptions& options) {
-    constexpr double share_of_rays = 0.2; // a tenth of the time
-    const LightTransport transport(transfer, surface);
-    const Display display(transfer, surface);
     VerificationOptions verification;
     verification.seed = hash64(options.seed, 0x7e41f);
-    verification.most_rays = static_cast<std::uint64_t>(
-        share_of_rays * static_cast<double>(report.links.rays + report.points_rays));
-    return verify(transport, display, surface, report.viewpoints, verification);
+    verification.most_rays = verification_rays(report);
+    return Verifier(surface, report.viewpoints, verification).error_of(transfer);
 }
 
 Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
@@ -176,6 +184,52 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
     if (verified.any()) say("verified error %s\n", verified.text().c_str());
 }
 
+TransferOperator plain_transfer(const PrecomputeCommand& command, const Surface& surface,
+                                PrecomputeReport& report) {
+    Progress progress("precomputing", !command.run.quiet);
+    PrecomputeOptions options = command.options;
+    options.progress = [&](double share) { progress.update(share); };
+    return precompute(surface, options, &report);
+}
+
+TransferOperator tuned_transfer(const PrecomputeCommand& command, const Surface& surface,
+                                PrecomputeReport& report, TuningReport& tuning) {
+    std::optional<Progress> progress;
+    PrecomputeOptions options = command.options;
+    options.progress = [&](double share) { progress->update(share); };
+    TuningOptions limits;
+    limits.target_error = command.target_error;
+    if (command.max_time > 0.0) limits.most_seconds = command.max_time;
+    if (command.max_memory > 0.0) limits.most_bytes = 1e9 * command.max_memory;
+    limits.begin_step = [&](int step, float) {
+        progress.emplace("precomputing, step " + std::to_string(step + 1), !command.run.quiet);
+    };
+    return precompute_to_target(surface, options, limits, report, tuning);
+}
+
+/// How the spacing was chosen, and whether that led to the target.
+void print_tuning(const PrecomputeCommand& command, const TuningReport& tuning,
+                  const VerifiedError& verified) {
+    for (std::size_t k = 0; k < tuning.steps.size(); ++k) {
+        const TuningStep& step = tuning.steps[k];
+        std::fprintf(stderr, "step %zu: spacing %.3g of the usual, error %.1f %% +- %.1f, %s\n", k + 1,
+                     static_cast<double>(step.coarse_scale), 100.0 * step.error.rel_rmse,
+                     100.0 * step.error.standard_error, duration_text(step.seconds).c_str());
+    }
+    const char* reason = nullptr;
+    switch (tuning.end) {
+        case TuningEnd::reached: break;
+        case TuningEnd::most_seconds: reason = "a finer step would exceed --max-time"; break;
+        case TuningEnd::most_bytes: reason = "a finer step would exceed --max-memory"; break;
+        case TuningEnd::finest: reason = "finer functions would not help"; break;
+    }
+    if (!reason && verified.any() && verified.rel_rmse > 1.2 * command.target_error)
+        reason = "these lights are harder than those that it was tuned by";
+    if (reason)
+        std::fprintf(stderr, "afterglow: warning: the target error of %.3g %% was not reached: %s\n",
+                     100.0 * command.target_error, reason);
+}
+
 void run(PrecomputeCommand& command) {
     check_output(command.output);
     if (!command.report.empty()) check_output(command.report);
@@ -191,18 +245,16 @@ void run(PrecomputeCommand& command) {
     outer.tree = lap(time);
 
     PrecomputeReport report;
-    const TransferOperator transfer = [&] {
-        Progress progress("precomputing", !command.run.quiet);
-        command.options.progress = [&](double share) { progress.update(share); };
-        return precompute(surface, command.options, &report);
-    }();
+    TuningReport tuning;
+    const TransferOperator transfer = command.tuned ? tuned_transfer(command, surface, report, tuning)
+                                                    : plain_transfer(command, surface, report);
     lap(time);
     VerifiedError verified;
     if (!command.no_verification) verified = verified_error(surface, transfer, report, command.options);
     outer.verification = lap(time);
     const LinkCounts links(transfer);
     const Json options = options_json(command);
-    const Json statistics = statistics_json(transfer, report, links, verified);
+    const Json statistics = statistics_json(transfer, report, links, verified, tuning);
     const std::string hash = scene.content_hash();
     save_transfer(command.output, transfer,
                   {AFTERGLOW_VERSION, command.scene, hash, command.options.seed, options.dump(),
@@ -222,7 +274,9 @@ void run(PrecomputeCommand& command) {
                            {"seconds", seconds_json(report, outer)}};
         write_file(command.report, json.dump(1) + "\n");
     }
-    if (!command.run.quiet) print_results(command, transfer, report, links, verified, outer);
+    if (command.run.quiet) return;
+    print_results(command, transfer, report, links, verified, outer);
+    if (command.tuned) print_tuning(command, tuning, verified);
 }
 
 /// Turns what was typed into PrecomputeOptions; throws UsageError for what cannot be.
@@ -242,6 +296,15 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     }
     if (given("--target-error") && !(command.target_error > 0.0))
         throw UsageError("--target-error must be positive");
+    for (const char* limit : {"--max-time", "--max-memory"})
+        if (given(limit) && !((limit[6] == 't' ? command.max_time : command.max_memory) > 0.0))
+            throw UsageError(std::string(limit) + " must be positive");
+    command.tuned = given("--target-error") || given("--max-time") || given("--max-memory");
+    if (command.tuned && (given("--coarse-radius") || given("--epsilon") || command.operator_name == "paper"))
+        throw UsageError("--target-error, --max-time and --max-memory choose what --coarse-radius and "
+                         "--epsilon say; give these or those (--operator paper knows only the latter)");
+    if (command.draft && (command.tuned || given("--coarse-radius")))
+        throw UsageError("--draft chooses the spacing itself");
     if (given("--epsilon") && !(command.epsilon >= 0.0))
         throw UsageError("--epsilon must not be negative");
     if (given("--coarse-radius") && !(command.coarse_radius > 0.0))
@@ -251,6 +314,11 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     options.coarse_radius = static_cast<float>(command.coarse_radius);
     if (given("--epsilon")) options.links.threshold = static_cast<float>(command.epsilon);
     options.links.target_error = command.target_error;
+    if (command.draft) {
+        options.coarse_scale = draft_scale;
+        if (!given("--rays")) options.links.rays = draft_rays;
+        command.no_verification = true;
+    }
     options.links.rays = std::max(16, static_cast<int>(std::bit_ceil(
                                           static_cast<unsigned>(options.links.rays))));
     check(options);
@@ -266,8 +334,12 @@ void add_precompute_command(CLI::App& app) {
     sub->add_option("-o,--output", command->output, "Transfer file")->required();
     CLI::Option* target_error =
         add_number(*sub, "--target-error", command->target_error,
-                   "Relative error of the indirect irradiance that dropped links may make "
-                   "(default 0.1)");
+                   "Relative error of the indirect irradiance to aim at: the spacing follows, by steps "
+                   "that are compared with the path tracer (default: the usual spacing, in one step)");
+    add_number(*sub, "--max-time", command->max_time,
+               "Seconds that --target-error (default 0.1) may take: the best that is reached by then");
+    add_number(*sub, "--max-memory", command->max_memory, "Gigabytes that it may take");
+    sub->add_flag("--draft", command->draft, "A preview in seconds: wide spacing, few rays, not verified");
     add_number(*sub, "--epsilon", command->epsilon,
                "Instead: links below this size are dropped (default of --operator paper: 0.025/pi)")
         ->excludes(target_error);

@@ -29,7 +29,7 @@ void run(QueryCommand& command) {
     const TransferScene opened(command.file, command.scene);
     const VectorIrradiance field = opened.transport.indirect(command.light);
     Index uncovered = 0;
-    const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, &uncovered);
+    const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, command.light, &uncovered);
     write_irradiance_csv(command.output, irradiance);
 
     if (command.run.quiet) return;

@@ -23,7 +23,7 @@ struct RenderCommand {
     std::string file, scene, output, layer = "indirect";
     Spotlight light;
     Camera camera;
-    int samples = 4;
+    int samples = 4, gap_paths = 256;
     double exposure = 0.18;
     RunOptions run;
 };
@@ -44,6 +44,7 @@ std::map<std::string, std::string> attributes(const RenderCommand& command,
         {"afterglow.seed", std::to_string(provenance.seed)},
         {"afterglow.layer", command.layer},
         {"afterglow.samples_per_pixel", std::to_string(command.samples)},
+        {"afterglow.gap_paths", std::to_string(command.gap_paths)},
         {"afterglow.uncovered_pixels", std::to_string(uncovered_pixels)}});
     return all;
 }
@@ -63,7 +64,8 @@ void run(RenderCommand& command) {
         field = opened.transport.indirect(command.light, &neumann);
     const auto lit = Clock::now();
     RenderedPicture picture = render_picture(opened.surface, opened.display, field, command.light,
-                                             command.camera, layer, command.samples);
+                                             command.camera, layer, command.samples,
+                                             command.gap_paths);
     const auto rendered = Clock::now();
     picture.image.attributes = attributes(command, opened, picture.uncovered_pixels);
     write_image(command.output, picture.image, PixelType::half_float,
@@ -91,6 +93,9 @@ void add_render_command(CLI::App& app) {
         "direct, indirect (radiance to the camera), full or irradiance (default indirect)");
     sub->add_option("--samples", command->samples, "Samples a pixel (default 4)")
         ->check(CLI::Range(1, 4096));
+    sub->add_option("--gap-paths", command->gap_paths,
+                    "Paths a pixel in narrow gaps, 0 to show what the viewer shows (default 256)")
+        ->check(CLI::Range(0, 65536));
     add_number(*sub, "--exposure", command->exposure,
                "Key of the tone map, for .png alone (default 0.18)");
     sub->add_option("--scene", command->scene, "Where the scene is now");

@@ -49,6 +49,7 @@ HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSo
         if (options.kind == OperatorKind::neumann)
             hierarchy.coarse_radius *= finer_for_few_surfaces(source, hierarchy.coarse_radius,
                                                               options.receiver_levels);
+        hierarchy.coarse_radius *= options.coarse_scale;
     }
     if (options.kind == OperatorKind::paper) {
         hierarchy.levels = options.receiver_levels;

@@ -14,8 +14,9 @@ namespace afterglow {
 struct PrecomputeOptions {
     OperatorKind kind = OperatorKind::neumann;
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
-    float coarse_radius = 0.0f;    // R of the coarsest level [world]; 0: from the typical ray length and how many
-                                   // points it takes
+    float coarse_radius = 0.0f; // R of the coarsest level [world]; 0: from the typical ray length and how many
+                                // points it takes
+    float coarse_scale = 1.0f; // of the radius that is found by itself
     /// Levels of receivers, spacing R, R/2, R/4 ...; the last is the display level.
     int receiver_levels = 6;
     /// Levels of senders, spaced alike; they share the points of the receivers' levels but the

@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 #include "core/sampling.h"
 
+#include <algorithm>
 
 namespace afterglow {
 namespace {
@@ -16,6 +17,7 @@ struct Shader {
     const VectorIrradiance& field;
     const Spotlight& light;
     Layer layer;
+    int gap_paths;
 
     Rgb operator()(const Hit& hit, bool& covered) const {
         const SurfacePoint x = surface.point(hit);
@@ -23,7 +25,7 @@ struct Shader {
         Rgb irradiance = Rgb::Zero();
         if (layer == Layer::direct || layer == Layer::full)
             irradiance += direct_irradiance(surface, light, x, shown);
-        if (layer != Layer::direct) irradiance += display.irradiance(x, shown, field, covered);
+        if (layer != Layer::direct) irradiance += display.irradiance(x, shown, field, light, covered, gap_paths);
         if (layer == Layer::irradiance) return irradiance;
         return surface.reflectance(hit) / static_cast<float>(EIGEN_PI) * irradiance;
     }
@@ -41,8 +43,10 @@ std::vector<Vec2> pixel_pattern(int samples) {
 
 RenderedPicture render_picture(const Surface& surface, const Display& display,
                                const VectorIrradiance& field, const Spotlight& light,
-                               const Camera& camera, Layer layer, int samples) {
-    const Shader shade{surface, display, field, light, layer};
+                               const Camera& camera, Layer layer, int samples,
+                               int gap_paths) {
+    const int paths_of_sample = gap_paths > 0 ? std::max(16, gap_paths / samples) : 0;
+    const Shader shade{surface, display, field, light, layer, paths_of_sample};
     const std::vector<Vec2> pattern = pixel_pattern(samples);
     const Index pixel_count = static_cast<Index>(camera.width) * camera.height;
     RenderedPicture result;

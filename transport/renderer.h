@@ -20,10 +20,12 @@ struct RenderedPicture {
 
 /// The picture of render_reference() by precomputed transport. `field`, as from
 /// LightTransport::indirect() under the same light, is not looked at for Layer::direct, and may be
-/// empty then. `samples` a pixel, in the same stratified pattern in each: box filter.
+/// empty then. `samples` a pixel, in the same stratified pattern in each: box filter. Together they
+/// have about `gap_paths` paths in a gap (Display::irradiance); 0: functions alone, as in the viewer.
 RenderedPicture render_picture(const Surface& surface, const Display& display,
                                const VectorIrradiance& field, const Spotlight& light,
-                               const Camera& camera, Layer layer, int samples);
+                               const Camera& camera, Layer layer, int samples,
+                               int gap_paths = 256);
 
 /// Where in each pixel [0, 1)^2 the samples of render_picture lie, the same in each: a pattern that
 /// changed from pixel to pixel would fray edges. Each of `samples` columns and rows of equal width

@@ -2,7 +2,8 @@
 
 #include "basis/candidates.h"
 #include "core/sampling.h"
-#include "transport/path_tracer.h"
+#include "transport/display.h"
+#include "transport/transfer_operator.h"
 
 #include <algorithm>
 #include <array>
@@ -48,14 +49,14 @@ private:
         return ray.origin + (0.25f + 0.5f * rng_.uniform()) * length * ray.direction;
     }
 
-    /// Whether the harmonic mean of the distances around is a quarter of what light travels here.
+    /// Whether the harmonic mean of the distances around is half of what light travels here.
     bool is_open(const Vec3& place) const {
         constexpr std::uint32_t rays = 64;
         double inverse = 0.0;
         for (std::uint32_t k = 0; k < rays; ++k)
             if (const Hit hit = surface_.closest_hit({place, sample_sphere(scrambled_sobol2(k, 5))}))
                 inverse += 1.0 / hit.distance;
-        return rays > inverse * source_.mean_ray_length() / 4.0;
+        return rays > inverse * source_.mean_ray_length() / 2.0;
     }
 };
 
@@ -101,8 +102,8 @@ Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, 
 std::string VerifiedError::text() const {
     std::array<char, 200> line{};
     std::snprintf(line.data(), line.size(),
-                  "%.1f %% +- %.1f (relRMSE of indirect irradiance at %d places, the worst of %d random spotlights)",
-                  100.0 * rel_rmse, 100.0 * standard_error, places, lights);
+                  "%.1f %% +- %.1f (relRMSE of indirect irradiance, %d points, %d random spotlights; the worst %.1f %%)",
+                  100.0 * rel_rmse, 100.0 * standard_error, places, lights, 100.0 * worst);
     return line.data();
 }
 
@@ -120,7 +121,8 @@ VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::
     };
     VerifiedError error;
     error.places = static_cast<int>(places);
-    error.rel_rmse = rel_rmse(square.sum(), places);
+    error.rel_rmse = error.worst = rel_rmse(square.sum(), places);
+    error.lights = 1;
     error.bias = found.cast<double>().mean() / mean - 1.0;
     error.reference_error = std::sqrt(standard_error.cast<double>().square().mean()) / mean;
     double spread = 0.0, centre = 0.0;
@@ -140,11 +142,11 @@ VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::
     return error;
 }
 
-VerifiedError verify(const LightTransport& transport, const Display& display, const Surface& surface,
-                     const std::vector<Vec3>& viewpoints, const VerificationOptions& options) {
-    const Trial trial = random_trial(surface, viewpoints, options.lights, options.places, options.seed);
-    if (trial.places.empty()) return {};
-
+Verifier::Verifier(const Surface& surface, const std::vector<Vec3>& viewpoints,
+                   const VerificationOptions& options)
+    : surface_(surface),
+      trial_(random_trial(surface, viewpoints, options.lights, options.places, options.seed)) {
+    if (trial_.places.empty()) return;
     constexpr double rays_of_path = 40.0; // shadow rays and connections to three lights included
     PathTracerOptions tracer;
     tracer.strategy = PathStrategy::connected;
@@ -152,23 +154,41 @@ VerifiedError verify(const LightTransport& transport, const Display& display, co
     tracer.target_error = options.reference_error;
     tracer.max_samples = std::max<Index>(
         tracer.batches, static_cast<Index>(static_cast<double>(options.most_rays) / (rays_of_path * options.places)));
-    const IrradianceEstimate reference = estimate_irradiance(surface, trial.lights, trial.places, tracer);
+    reference_ = estimate_irradiance(surface, trial_.lights, trial_.places, tracer);
+}
 
-    const auto lights = static_cast<Index>(trial.lights.size());
-    const auto places = static_cast<Index>(trial.places.size());
-    VerifiedError worst;
+VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
+    if (trial_.places.empty()) return {};
+    const LightTransport transport(transfer, surface_);
+    const Display display(transfer, surface_);
+    const auto lights = static_cast<Index>(trial_.lights.size());
+    const auto places = static_cast<Index>(trial_.places.size());
+    VerifiedError all;
+    double squares = 0.0, variance = 0.0; // of the sum of squares
+    int lit = 0;
     for (Index l = 0; l < lights; ++l) {
         const auto of_light = Eigen::seqN(l, places, lights);
-        const Eigen::Array3Xf indirect = reference.indirect(Eigen::all, of_light);
+        const Eigen::Array3Xf indirect = reference_.indirect(Eigen::all, of_light);
         if (!(indirect > 0.0f).any()) continue; // a light that shines out of the scene
-        const Eigen::Array3Xf found =
-            display.irradiance(trial.places, transport.indirect(trial.lights[static_cast<std::size_t>(l)]));
+        const Spotlight& light = trial_.lights[static_cast<std::size_t>(l)];
+        const Eigen::Array3Xf found = display.irradiance(trial_.places, transport.indirect(light), light);
         const VerifiedError error =
-            compare_with_reference(found, indirect, reference.standard_error(Eigen::all, of_light));
-        if (!worst.any() || error.rel_rmse > worst.rel_rmse) worst = error;
+            compare_with_reference(found, indirect, reference_.standard_error(Eigen::all, of_light));
+        ++lit;
+        squares += error.rel_rmse * error.rel_rmse;
+        variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);
+        if (!all.any() || error.rel_rmse > all.worst) {
+            all.worst = error.rel_rmse;
+            all.bias = error.bias;
+            all.reference_error = error.reference_error;
+        }
+        all.places = error.places;
     }
-    worst.lights = static_cast<int>(lights);
-    return worst;
+    if (lit == 0) return {};
+    all.lights = static_cast<int>(lights);
+    all.rel_rmse = std::sqrt(squares / lit);
+    if (all.rel_rmse > 0.0) all.standard_error = std::sqrt(variance) / lit / (2.0 * all.rel_rmse);
+    return all;
 }
 
 } // namespace afterglow

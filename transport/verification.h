@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/surface.h"
-#include "transport/display.h"
+#include "transport/path_tracer.h"
 #include "transport/spotlight.h"
 #include "transport/transfer_operator.h"
 
@@ -18,7 +18,7 @@ struct Trial {
 };
 
 /// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the
-/// distances around is at least a quarter of the typical ray length; they shine at what is farther of
+/// distances around is at least half of the typical ray length; they shine at what is farther of
 /// two random directions. Places are in sight of these and of as many other places in the open. Empty
 /// where hardly anything is in sight. `viewpoints` as from find_viewpoints().
 Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
@@ -32,21 +32,34 @@ struct VerificationOptions {
     std::uint64_t seed = 1;
 };
 
-/// How far an operator is from the path tracer: of the light of the trial under which it is worst.
+/// How far an operator is from the path tracer under the lights of a trial.
 struct VerifiedError {
-    double rel_rmse = 0.0;       // of indirect irradiance, the path tracer's own variance taken out
+    double rel_rmse = 0.0;       // of indirect irradiance: root mean square over the lights of each light's
+                                 // relRMSE, the path tracer's own variance taken out
     double standard_error = 0.0; // of rel_rmse, over the choice of places (jackknife of 20 groups)
-    double bias = 0.0;           // mean error over mean
-    double reference_error = 0.0;
+    double worst = 0.0;          // relRMSE under the light that has the largest
+    double bias = 0.0;           // mean error over mean, under that light
+    double reference_error = 0.0; // there
     int lights = 0, places = 0;
     bool any() const { return places > 0; }
     /// For a person, in one line.
     std::string text() const;
 };
 
-/// Compares with places and lights that depend on the seed and the scene alone.
-VerifiedError verify(const LightTransport& transport, const Display& display, const Surface& surface,
-                     const std::vector<Vec3>& viewpoints, const VerificationOptions& options);
+/// A trial, and what the path tracer says of it: to try several operators of one scene on.
+class Verifier {
+public:
+    /// Lights and places depend on the seed and the scene alone. Keeps a reference to the surface.
+    Verifier(const Surface& surface, const std::vector<Vec3>& viewpoints,
+             const VerificationOptions& options);
+    /// Nothing (any() is false) where hardly anything is in sight.
+    VerifiedError error_of(const TransferOperator& transfer) const;
+
+private:
+    const Surface& surface_;
+    Trial trial_;
+    IrradianceEstimate reference_; // none without places
+};
 
 /// The same for one light of a trial, of which the reference is known: 3 x places each [W/m^2].
 VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::Array3Xf& reference,

@@ -122,10 +122,9 @@ Eigen::Array3Xf displayed_irradiance(const Surface& surface, const TransferOpera
     const Display display(transfer, surface);
     Eigen::Array3Xf irradiance(3, 3 * static_cast<Index>(points.size()));
     for (Index l = 0; l < 3; ++l) {
-        const VectorIrradiance field =
-            transport.indirect(scene.lights[static_cast<std::size_t>(l)]);
+        const Spotlight& light = scene.lights[static_cast<std::size_t>(l)];
         irradiance(Eigen::all, Eigen::seq(l, Eigen::last, 3)) =
-            display.irradiance(points, field, &uncovered);
+            display.irradiance(points, transport.indirect(light), light, &uncovered);
     }
     return irradiance;
 }

@@ -62,7 +62,7 @@ Eigen::Array3Xf indirect_irradiance(const Experiment& experiment, const Transfer
         const VectorIrradiance field = transport.gather(sum);
         parallel_for(count, [&](Index p) {
             bool covered = false;
-            indirect.col(p * lights + l) = display.irradiance(experiment.places[p], field, covered);
+            indirect.col(p * lights + l) = display.net_irradiance(experiment.places[p], field, covered).max(0.0f);
         });
     }
     return indirect;

@@ -12,7 +12,7 @@ Precomputed::Precomputed(Scene scene, const PrecomputeOptions& options)
 
 Eigen::Array3Xf Precomputed::indirect(const Spotlight& light,
                                       std::span<const SurfacePoint> places) const {
-    return display_.irradiance(places, transport_.indirect(light));
+    return display_.irradiance(places, transport_.indirect(light), light);
 }
 
 Comparison Comparison::part(Index first, Index count) const {

@@ -70,8 +70,9 @@ Flicker measure_flicker(const Surface& surface, const TransferOperator& transfer
     MovingLight moving(transport, {});
     const Display display(transfer, surface);
     for (Index f = 0; f < frame_count; ++f) {
-        const VectorIrradiance& field = moving.follow(frames[static_cast<std::size_t>(f)]);
-        const Eigen::Array3Xf irradiance = display.irradiance(pixels.at, field);
+        const Spotlight& light = frames[static_cast<std::size_t>(f)];
+        const VectorIrradiance& field = moving.follow(light);
+        const Eigen::Array3Xf irradiance = display.irradiance(pixels.at, field, light);
         ours.col(f) = pixels.block_means([&](Index k) -> Rgb { return irradiance.col(k); });
     }
 

@@ -28,6 +28,22 @@ TEST(TwoRoomsWithADoor, AreWithinThreePercentAndTheDarkOneWithinFiveOfItsOwnMean
     EXPECT_LE(dark.rel_rmse(), 0.05);
 }
 
+class Gap : public testing::TestWithParam<std::pair<float, double>> {};
+
+TEST_P(Gap, UnderASheetIsLitAsThePathTracerSays) {
+    const auto [distance, promised] = GetParam();
+    LitScene lit = sheet_above_floor(1.0f, distance);
+    const Precomputed room(std::move(lit.scene));
+    std::vector<SurfacePoint> covered;
+    for (const Quad& quad : covered_by_sheet(1.0f, distance))
+        for (const SurfacePoint& x : places_on(quad, 200, covered.size())) covered.push_back(x);
+    const Comparison both = compare(room, lit.light, covered, 0.03);
+    EXPECT_LE(both.rel_rmse(), promised);
+    EXPECT_LE(std::abs(both.bias()), 0.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(Widths, Gap, testing::Values(std::pair(0.1f, 0.1), std::pair(0.01f, 0.2)));
+
 class Furnace : public testing::TestWithParam<std::pair<double, double>> {};
 
 /// A closed box whose indirect light is, in the mean over its six faces of 4 m^2, rho / (1 - rho)

@@ -32,7 +32,7 @@ OfSeeds indirect_of_seeds(const Setting& setting, std::uint64_t first, int count
         Eigen::Array3Xf e(3, lights * places);
         for (Index l = 0; l < lights; ++l) {
             const VectorIrradiance field = transport.indirect(setting.lights[l]);
-            e.middleCols(l * places, places) = display.irradiance(setting.places, field);
+            e.middleCols(l * places, places) = display.irradiance(setting.places, field, setting.lights[l]);
         }
         results.push_back(std::move(e));
     }

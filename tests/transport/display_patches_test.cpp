@@ -79,7 +79,7 @@ double relative_error(const Example& example, const Pixels& pixels,
             continue;
         }
         bool covered = false;
-        const Rgb expected = display.irradiance(pixels.view().point(p), example.field, covered);
+        const Rgb expected = display.net_irradiance(pixels.view().point(p), example.field, covered).max(0.0f);
         EXPECT_EQ(result[p][3], covered ? 1.0f : 0.0f) << "pixel " << p;
         squares += (Rgb(result[p][0], result[p][1], result[p][2]) - expected).square().sum();
         mean += expected.sum();

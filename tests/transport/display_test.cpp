@@ -37,7 +37,7 @@ TEST(Display, CoversAllThatIsInSightAndIsNeverNegative) {
         for (const SurfacePoint& x :
              points_in_sight(example.surface, *example.scene.viewpoint, 5000, 3)) {
             bool covered = false;
-            const Rgb e = display.irradiance(x, field, covered);
+            const Rgb e = display.net_irradiance(x, field, covered).max(0.0f);
             EXPECT_TRUE((e >= 0.0f).all() && e.isFinite().all());
             ++all;
             uncovered += !covered;
@@ -60,7 +60,7 @@ TEST(Display, IsTheBasisTimesTheFieldDottedWithTheNormal) {
             field[9 * i + 3 + c] = static_cast<float>(c + 1);
     for (const SurfacePoint& x : points_by_area(example.scene, 500, 4)) {
         bool covered = false;
-        const Rgb e = display.irradiance(x, field, covered);
+        const Rgb e = display.net_irradiance(x, field, covered).max(0.0f);
         if (!covered) continue;
         const Rgb expected = std::max(0.0f, x.normal.y()) * Rgb(1.0f, 2.0f, 3.0f);
         EXPECT_LT((e - expected).abs().maxCoeff(), 1e-4f) << x.normal.transpose();
@@ -76,7 +76,7 @@ TEST(Display, ReadsTheFinestLevelAlone) {
         field[k] = 1e6f;
     for (const SurfacePoint& x : points_by_area(example.scene, 500, 5)) {
         bool covered = false;
-        EXPECT_TRUE((display.irradiance(x, field, covered) == 0.0f).all());
+        EXPECT_TRUE((display.net_irradiance(x, field, covered).max(0.0f) == 0.0f).all());
     }
 }
 
@@ -86,7 +86,7 @@ TEST(Display, IsBlackWhereNothingCovers) {
     const Display display(example.transfer, example.surface);
     const VectorIrradiance field(9 * example.transfer.points.size(), 1.0f);
     bool covered = true;
-    const Rgb e = display.irradiance({Vec3(0, -1, 0), -Vec3::UnitY()}, field, covered);
+    const Rgb e = display.net_irradiance({Vec3(0, -1, 0), -Vec3::UnitY()}, field, covered).max(0.0f);
     EXPECT_FALSE(covered);
     EXPECT_TRUE((e == 0.0f).all());
 }

@@ -49,7 +49,7 @@ double mean_irradiance(const Display& display, const std::vector<SurfacePoint>& 
                                 [&](Index i) {
                                     bool covered = false;
                                     return static_cast<double>(
-                                        display.irradiance(places[i], field, covered)[1]);
+                                        display.net_irradiance(places[i], field, covered).max(0.0f)[1]);
                                 })
            / static_cast<double>(places.size());
 }
@@ -193,7 +193,7 @@ TEST(LightTransport, DoesNotLeakIntoAClosedRoom) {
         for (const auto& room : rooms)
             for (const SurfacePoint& place : room) {
                 bool covered = false;
-                display.irradiance(place, field, covered);
+                display.net_irradiance(place, field, covered).max(0.0f);
                 EXPECT_TRUE(covered) << place.position.transpose();
             }
         const double light = mean_irradiance(display, rooms[lit], field);

@@ -316,7 +316,9 @@ TEST(Renderer, SponzaFromSplatGatherAndCpuIsOnePicture) {
     const VectorIrradiance field = scene.transport.indirect(light);
     auto lit = std::make_shared<DisplayField>(scene.file.transfer.points);
     lit->set(field);
-    const Image indirect = render_picture(scene.surface, scene.display, field, light, camera, Layer::indirect, 4).image;
+    const auto cpu = [&](int gap_paths) {
+        return render_picture(scene.surface, scene.display, field, light, camera, Layer::indirect, 4, gap_paths).image;
+    };
     const Image direct = render_picture(scene.surface, scene.display, field, light, camera, Layer::direct, 1).image;
     Renderer renderer(context->gl(), scene, IndirectMethod::gather);
     renderer.set_light(light, lit);
@@ -326,7 +328,9 @@ TEST(Renderer, SponzaFromSplatGatherAndCpuIsOnePicture) {
     // (Looking again, patches are told apart more finely.)
     EXPECT_LT(difference(splatted, gathered), 0.005);
     // Single samples beside edges show the surface behind: one in 4000, with other light.
-    EXPECT_LT(difference(gathered, indirect), 0.01);
+    EXPECT_LT(difference(gathered, cpu(0)), 0.01);
+    // In gaps, a half per cent of the pixels, functions alone say something else.
+    EXPECT_LT(difference(gathered, cpu(256)), 0.02);
     renderer.draw(camera, ViewLayer::direct);
     EXPECT_LT(difference(renderer.read(), direct, shadow_edges(direct)), 0.02);
 }

@@ -1,0 +1,98 @@
+#include "transport/tuning.h"
+
+#include "core/sampling.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+
+namespace afterglow {
+namespace {
+
+constexpr float first_scale = 4.0f, finest_scale = 0.25f;
+constexpr int most_steps = 5;
+constexpr double aim = 0.85;           // of the target: error is known to a tenth
+constexpr double expected_order = 0.9; // of the error in the spacing
+constexpr double time_order = 1.1, memory_order = 1.5;
+
+/// The largest resident memory of this process so far [byte].
+double peak_memory() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+/// The order of the error as the last two steps show it.
+double order_of(const std::vector<TuningStep>& steps) {
+    if (steps.size() < 2) return expected_order;
+    const TuningStep &a = steps[steps.size() - 2], &b = steps.back();
+    const double order = std::log(a.error.rel_rmse / b.error.rel_rmse)
+                         / std::log(static_cast<double>(a.coarse_scale / b.coarse_scale));
+    return std::clamp(order, 0.5, 1.2);
+}
+
+} // namespace
+
+std::uint64_t verification_rays(const PrecomputeReport& report) {
+    return std::max<std::uint64_t>(4'000'000, (report.links.rays + report.points_rays) / 5);
+}
+
+TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions options,
+                                      const TuningOptions& tuning, PrecomputeReport& report,
+                                      TuningReport& result) {
+    using Clock = std::chrono::steady_clock;
+    const auto start = Clock::now();
+    const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+    const double memory_before = peak_memory();
+    options.links.target_error = tuning.target_error;
+    options.coarse_scale = first_scale;
+    std::optional<TransferOperator> transfer;
+    result = {};
+    for (;;) {
+        const double begin = elapsed();
+        const int step = static_cast<int>(result.steps.size());
+        if (tuning.begin_step) tuning.begin_step(step, options.coarse_scale);
+        report = {};
+        transfer.reset(); // two at a time would take twice the memory
+        transfer = precompute(surface, options, &report);
+        // The same lights and places each time, by ever more paths.
+        const Verifier verifier(surface, report.viewpoints,
+                                {.lights = 6,
+                                 .reference_error = 0.03,
+                                 .most_rays = verification_rays(report),
+                                 .seed = hash64(options.seed, 0x7a5e)});
+        result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
+        const TuningStep& last = result.steps.back();
+        const double error = last.error.rel_rmse;
+        result.end = TuningEnd::reached;
+        if (error + last.error.standard_error <= tuning.target_error) break;
+        result.end = TuningEnd::finest;
+        if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
+
+        const double wanted = std::pow(aim * tuning.target_error / error, 1.0 / order_of(result.steps));
+        double scale = last.coarse_scale * std::clamp(wanted, 0.15, 0.8);
+        scale = std::max(scale, static_cast<double>(finest_scale));
+        // As fine as the limits let it be, if that is worth a step.
+        const double coarsest_worthwhile = 0.8 * last.coarse_scale;
+        const double of_time = last.coarse_scale
+                               * std::pow(last.seconds / std::max(1e-9, tuning.most_seconds - elapsed()), 1.0 / time_order);
+        const double of_memory =
+            last.coarse_scale
+            * std::pow((peak_memory() - memory_before) / std::max(1.0, tuning.most_bytes - memory_before),
+                       1.0 / memory_order);
+        if (std::max(of_time, of_memory) > scale) {
+            scale = std::max(of_time, of_memory);
+            if (scale > coarsest_worthwhile) {
+                result.end = of_time > of_memory ? TuningEnd::most_seconds : TuningEnd::most_bytes;
+                break;
+            }
+        }
+        options.coarse_scale = static_cast<float>(scale);
+    }
+    return std::move(*transfer);
+}
+
+} // namespace afterglow

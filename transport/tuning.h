@@ -1,0 +1,52 @@
+#pragma once
+
+#include "transport/precompute.h"
+#include "transport/verification.h"
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <vector>
+
+namespace afterglow {
+
+/// Rays that a comparison with the path tracer may take, about a tenth of the time of an operator; in
+/// small scenes what it takes to say anything.
+std::uint64_t verification_rays(const PrecomputeReport& report);
+
+struct TuningOptions {
+    double target_error = 0.1; // relRMSE as Verifier::error_of has it
+    /// Wall-clock time of all that precompute_to_target() does [s], and resident memory of the process
+    /// [byte]: a step that is expected to exceed one is not begun, but the first always is.
+    double most_seconds = std::numeric_limits<double>::infinity();
+    double most_bytes = std::numeric_limits<double>::infinity();
+    /// Is told before each step.
+    std::function<void(int step, float coarse_scale)> begin_step = {};
+};
+
+struct TuningStep {
+    float coarse_scale = 1.0f; // of PrecomputeOptions
+    VerifiedError error;       // under lights and at places that all steps share
+    double seconds = 0.0;
+};
+
+enum class TuningEnd { reached, most_seconds, most_bytes, finest };
+
+struct TuningReport {
+    std::vector<TuningStep> steps; // from coarse to fine; the last one is the result
+    TuningEnd end = TuningEnd::reached;
+};
+
+/// Chooses the spacing of the functions by itself: a coarse precomputation is compared with the path
+/// tracer under six random lights; error goes about like a power of the spacing, near one, so that
+/// the next step's spacing follows; and so on until the target is met. Mostly two steps, of which the
+/// first takes a small part of the time. Other lights and places should tell how well it went, as the
+/// steps were chosen by these. What is dropped of links follows the target too (link_threshold()).
+///
+/// options.coarse_radius must be 0, and the operator neumann. With a limit of time the result depends
+/// on the machine.
+TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions options,
+                                      const TuningOptions& tuning, PrecomputeReport& report,
+                                      TuningReport& steps);
+
+} // namespace afterglow
