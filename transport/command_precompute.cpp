@@ -296,9 +296,10 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     }
     if (given("--target-error") && !(command.target_error > 0.0))
         throw UsageError("--target-error must be positive");
-    for (const char* limit : {"--max-time", "--max-memory"})
-        if (given(limit) && !((limit[6] == 't' ? command.max_time : command.max_memory) > 0.0))
-            throw UsageError(std::string(limit) + " must be positive");
+    if (given("--max-time") && !(command.max_time > 0.0))
+        throw UsageError("--max-time must be positive");
+    if (given("--max-memory") && !(command.max_memory > 0.0))
+        throw UsageError("--max-memory must be positive");
     command.tuned = given("--target-error") || given("--max-time") || given("--max-memory");
     if (command.tuned && (given("--coarse-radius") || given("--epsilon") || command.operator_name == "paper"))
         throw UsageError("--target-error, --max-time and --max-memory choose what --coarse-radius and "

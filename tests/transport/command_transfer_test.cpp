@@ -74,6 +74,14 @@ TEST_F(CommandTransfer, WhatPrecomputeCannotDoIsStatusTwoAndLeavesNothing) {
                                 "--target-error x",
                                 "--epsilon -1",
                                 "--epsilon 0.1 --target-error 0.1",
+                                "--epsilon 0.1 --max-time 5",
+                                "--coarse-radius 0.2 --target-error 0.1",
+                                "--coarse-radius 0.2 --draft",
+                                "--draft --target-error 0.1",
+                                "--max-time 0",
+                                "--max-time nan",
+                                "--max-memory -1",
+                                "--operator paper --max-time 5",
                                 "--viewpoint 0,0",
                                 "--viewpoint 0,0,nan",
                                 "--coarse-radius 0",
@@ -101,6 +109,29 @@ TEST_F(CommandTransfer, WhatPrecomputeCannotDoIsStatusTwoAndLeavesNothing) {
     expect_failure(run("precompute builtin:nowhere -o" + quoted(folder.path("t"))), 2);
     expect_failure(run("precompute builtin:cornell"), 2);
     EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST_F(CommandTransfer, TargetErrorTellsItsStepsAndWhatItCouldNotReach) {
+    const std::string start = "precompute builtin:cornell -o" + quoted(folder.path("t"));
+    const Outcome made = run(start + " --target-error 0.2 --report" + quoted(folder.path("r.json")));
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_NE(made.err.find("\nstep 1: spacing "), std::string::npos) << made.err;
+    EXPECT_NE(made.err.find("verified error"), std::string::npos) << made.err;
+    EXPECT_EQ(made.err.find("not reached"), std::string::npos) << made.err;
+    EXPECT_NE(content_of(folder.path("r.json")).find("\"tuning\": ["), std::string::npos);
+
+    const Outcome hurried = run(start + " --target-error 0.001 --max-time 0.01");
+    EXPECT_EQ(hurried.status, 0) << hurried.err;
+    EXPECT_NE(hurried.err.find("0.1 % was not reached: a finer step would exceed --max-time"),
+              std::string::npos) << hurried.err;
+}
+
+TEST_F(CommandTransfer, ADraftIsSmallAndNotVerified) {
+    const std::string draft = folder.path("draft");
+    const Outcome made = run("precompute builtin:cornell --draft -o" + quoted(draft));
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_EQ(made.err.find("verified"), std::string::npos) << made.err;
+    EXPECT_LT(content_of(draft).size(), 4'000'000u); // 11 MB otherwise
 }
 
 TEST_F(CommandTransfer, WhereNothingCanBeWrittenNothingIsComputed) {

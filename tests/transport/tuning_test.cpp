@@ -1,0 +1,77 @@
+#include "transport/tuning.h"
+
+#include "core/builtin_scenes.h"
+#include "core/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace afterglow {
+namespace {
+
+struct Tuned {
+    Scene scene = make_builtin_scene("builtin:cornell");
+    Surface surface{scene};
+    PrecomputeReport report;
+    TuningReport tuning;
+    TransferOperator transfer;
+
+    explicit Tuned(const TuningOptions& options)
+        : transfer(precompute_to_target(surface, PrecomputeOptions(), options, report, tuning)) {}
+    const TuningStep& last() const { return tuning.steps.back(); }
+};
+
+TEST(Tuning, StopsWhereTheTargetIsMet) {
+    const Tuned coarse({.target_error = 0.3}), fine({.target_error = 0.06});
+    for (const auto& [tuned, target] : {std::pair(&coarse, 0.3), std::pair(&fine, 0.06)}) {
+        EXPECT_EQ(tuned->tuning.end, TuningEnd::reached);
+        EXPECT_LE(tuned->last().error.rel_rmse + tuned->last().error.standard_error, target);
+        for (std::size_t k = 1; k < tuned->tuning.steps.size(); ++k) {
+            const TuningStep &before = tuned->tuning.steps[k - 1], &after = tuned->tuning.steps[k];
+            EXPECT_LT(after.coarse_scale, before.coarse_scale);
+            EXPECT_GT(before.error.rel_rmse + before.error.standard_error, target);
+        }
+    }
+    EXPECT_LT(coarse.transfer.points.size(), fine.transfer.points.size());
+    EXPECT_GT(coarse.last().error.rel_rmse, fine.last().error.rel_rmse);
+    EXPECT_GT(fine.tuning.steps.size(), 1u);
+
+    // And with lights and places that the tuning did not see.
+    const Verifier fresh(fine.surface, fine.report.viewpoints, {.reference_error = 0.02, .seed = 99});
+    const VerifiedError error = fresh.error_of(fine.transfer);
+    EXPECT_LE(error.rel_rmse - 2.0 * error.standard_error, 1.2 * 0.06);
+}
+
+TEST(Tuning, ChoosesTheSameAtAnyNumberOfThreads) {
+    const auto steps = [](int threads) {
+        const ThreadLimit limit(threads);
+        return Tuned({.target_error = 0.12}).tuning.steps;
+    };
+    const auto one = steps(1), two = steps(2);
+    ASSERT_EQ(one.size(), two.size());
+    for (std::size_t k = 0; k < one.size(); ++k) {
+        EXPECT_EQ(one[k].coarse_scale, two[k].coarse_scale);
+        EXPECT_EQ(one[k].error.rel_rmse, two[k].error.rel_rmse);
+    }
+}
+
+TEST(Tuning, GivesTheBestItHasWithinItsLimits) {
+    const Tuned hurried({.target_error = 0.001, .most_seconds = 1e-3});
+    EXPECT_EQ(hurried.tuning.steps.size(), 1u);
+    EXPECT_EQ(hurried.tuning.end, TuningEnd::most_seconds);
+    EXPECT_GT(hurried.transfer.points.size(), 0u);
+
+    const Tuned narrow({.target_error = 0.001, .most_bytes = 1e6});
+    EXPECT_EQ(narrow.tuning.steps.size(), 1u);
+    EXPECT_EQ(narrow.tuning.end, TuningEnd::most_bytes);
+
+    // A limit that leaves room is used.
+    const Tuned limited({.target_error = 0.001, .most_seconds = 8.0});
+    EXPECT_GT(limited.tuning.steps.size(), 1u);
+    EXPECT_EQ(limited.tuning.end, TuningEnd::most_seconds);
+    EXPECT_LT(limited.last().coarse_scale, hurried.last().coarse_scale);
+}
+
+} // namespace
+} // namespace afterglow
