@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "transport/command_chart.h"
 #include "transport/command_compare.h"
 #include "transport/command_info.h"
 #include "transport/command_precompute.h"
@@ -21,6 +22,7 @@ int main(int argc, char** argv) {
     afterglow::add_info_command(app);
     afterglow::add_reference_command(app);
     afterglow::add_compare_command(app);
+    afterglow::add_chart_command(app);
 
     const auto fail = [](const std::exception& error, int status, const char* remedy = "") {
         std::fprintf(stderr, "afterglow: %s%s\n", error.what(), remedy);

@@ -14,7 +14,8 @@ namespace {
 
 constexpr float first_scale = 4.0f, finest_scale = 0.25f;
 constexpr int most_steps = 5;
-constexpr double aim = 0.85;           // of the target: error is known to a tenth
+// Shares of the target, as errors are known to a tenth: what a step aims at, and what is good enough.
+constexpr double aim = 0.8, safely = 0.9;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double time_order = 1.1, memory_order = 1.5;
 
@@ -68,7 +69,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         const TuningStep& last = result.steps.back();
         const double error = last.error.rel_rmse;
         result.end = TuningEnd::reached;
-        if (error + last.error.standard_error <= tuning.target_error) break;
+        if (error <= std::max(safely * tuning.target_error, tuning.target_error - last.error.standard_error)) break;
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
 

@@ -1,0 +1,166 @@
+#include "transport/chart.h"
+
+#include "core/sampling.h"
+#include "transport/path_tracer.h"
+#include "transport/transfer_file.h"
+#include "transport/tuning.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+
+namespace afterglow {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+constexpr int trial_lights = 3, trial_places = 1000;
+
+VerificationOptions trial_options(std::uint64_t seed) {
+    return {.lights = trial_lights,
+            .places = trial_places,
+            .reference_error = 0.02,
+            .most_rays = 400'000'000,
+            .seed = hash64(seed, 0xc4a87)};
+}
+
+} // namespace
+
+std::vector<ChartSetting> chart_settings(bool brief, std::uint64_t seed) {
+    std::vector<ChartSetting> settings;
+    PrecomputeOptions usual;
+    usual.seed = seed;
+    const auto add = [&](const char* sweep, std::vector<double> values, const auto& change) {
+        for (const double value : values) {
+            ChartSetting& setting = settings.emplace_back(ChartSetting{sweep, value, usual});
+            change(setting, value);
+        }
+    };
+    const auto full = [&](std::vector<double> few, std::vector<double> more) {
+        if (!brief) few.insert(few.end(), more.begin(), more.end());
+        return few;
+    };
+    const auto scale = [](ChartSetting& s, double v) { s.options.coarse_scale = static_cast<float>(v); };
+    add("spacing", full({4.0, 2.8}, {2.0, 1.4, 1.0, 0.7}), scale);
+    add("target", full({0.3, 0.2}, {0.1, 0.05, 0.03}), [](ChartSetting& s, double v) { s.target = v; });
+    add("path", full({4, 16}, {64, 256}), [](ChartSetting& s, double v) { s.path_samples = static_cast<Index>(v); });
+    add("paper", full({0.2}, {0.1, 0.05, 0.025}), [&](ChartSetting& s, double v) {
+        s.options = PrecomputeOptions::paper();
+        s.options.seed = seed;
+        s.options.links.threshold = static_cast<float>(v / EIGEN_PI);
+    });
+    if (brief) return settings;
+
+    add("dense", {4.0, 2.8, 2.0}, [&](ChartSetting& s, double v) {
+        scale(s, v);
+        s.options.links.threshold = 0.0f;
+    });
+    add("flat", {0.25, 0.125, 0.0884, 0.0625}, [](ChartSetting& s, double v) {
+        s.options.receiver_levels = 2;
+        s.options.sender_levels = 1;
+        s.radius_share = static_cast<float>(v);
+    });
+    const auto alone = [&](const char* sweep, std::vector<double> values, const auto& change) {
+        add(sweep, std::move(values), [&](ChartSetting& s, double v) {
+            s.radius_share = 2.0f;
+            change(s.options, v);
+        });
+    };
+    alone("rays", {64, 128, 256, 512, 1024, 2048},
+          [](PrecomputeOptions& o, double v) { o.links.rays = static_cast<int>(v); });
+    alone("receiver_levels", {4, 5, 6, 7},
+          [](PrecomputeOptions& o, double v) { o.receiver_levels = static_cast<int>(v); });
+    alone("sender_levels", {2, 3, 4, 5, 6},
+          [](PrecomputeOptions& o, double v) { o.sender_levels = static_cast<int>(v); });
+    alone("threshold", {0.25, 0.5, 1, 2, 4, 8},
+          [](PrecomputeOptions& o, double v) { o.links.target_error *= v; });
+    alone("bounces", {1, 2, 3, 5, 0},
+          [](PrecomputeOptions& o, double v) { o.bounces = static_cast<int>(v); });
+    return settings;
+}
+
+ChartBench::ChartBench(const Surface& surface, std::string folder, std::uint64_t seed)
+    : surface_(surface), folder_(std::move(folder)), seed_(seed),
+      viewpoints_(find_viewpoints(surface, seed)),
+      verifier_(surface, viewpoints_, trial_options(seed)) {}
+
+ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
+    const VerificationOptions options = trial_options(seed_);
+    const Trial trial = random_trial(surface_, viewpoints_, options.lights, options.places, options.seed);
+    ChartPoint point;
+    point.sweep = setting.sweep;
+    point.value = setting.value;
+    PathTracerOptions tracer;
+    tracer.strategy = PathStrategy::connected;
+    tracer.samples = setting.path_samples;
+    tracer.batches = static_cast<int>(std::min<Index>(16, setting.path_samples));
+    tracer.seed = hash64(seed_, 0x9a7b);
+    double squares = 0.0;
+    for (const Spotlight& light : trial.lights) {
+        const auto start = Clock::now();
+        const IrradianceEstimate estimate = estimate_irradiance(surface_, {&light, 1}, trial.places, tracer);
+        point.seconds += seconds_since(start) / trial_lights;
+        point.rays += estimate.rays;
+        squares += estimate.relative_error[0] * estimate.relative_error[0] / trial_lights;
+        point.error.worst = std::max(point.error.worst, estimate.relative_error[0]);
+    }
+    constexpr double pixels = 1280.0 * 720.0;
+    point.seconds *= pixels / static_cast<double>(trial.places.size());
+    point.error.rel_rmse = std::sqrt(squares);
+    point.error.lights = trial_lights;
+    point.error.places = trial_places;
+    return point;
+}
+
+ChartPoint ChartBench::measure(const ChartSetting& setting) const {
+    if (setting.path_samples > 0) return measure_paths(setting);
+    ChartPoint point;
+    point.sweep = setting.sweep;
+    point.value = setting.value;
+    PrecomputeOptions options = setting.options;
+    if (setting.radius_share > 0.0f) options.coarse_radius = setting.radius_share * usual_radius_;
+    PrecomputeReport report;
+    TuningReport tuning;
+    const auto start = Clock::now();
+    const TransferOperator transfer =
+        setting.target
+            ? precompute_to_target(surface_, options, {.target_error = *setting.target}, report, tuning)
+            : precompute(surface_, options, &report);
+    point.seconds = seconds_since(start);
+    point.points_seconds = report.points_seconds;
+    point.push_seconds = report.push_seconds;
+    point.pull_seconds = report.pull_seconds;
+    point.gather_seconds = report.links.trace_seconds;
+    point.rows_seconds = report.links.rows_seconds;
+    point.links_seconds = report.links.links_seconds;
+    point.series_seconds = report.series_seconds;
+    point.tuning_seconds = point.seconds - report.total_seconds;
+    point.functions = transfer.points.size();
+    for (int l = 0; l < transfer.points.levels(); ++l) point.links += transfer.link_count(l);
+    point.rays = report.links.rays + report.points_rays;
+    point.coarse_radius = transfer.points.spacing[0];
+
+    const std::string file = folder_ + "/chart.safetensors";
+    save_transfer(file, transfer, {AFTERGLOW_VERSION, surface_.scene().name, "", seed_, "{}", "{}"});
+    point.bytes = std::filesystem::file_size(file);
+    std::filesystem::remove(file);
+
+    const LightTransport transport(transfer, surface_);
+    const VerificationOptions trial = trial_options(seed_);
+    const Spotlight light = random_trial(surface_, viewpoints_, 1, 1, trial.seed).lights.at(0);
+    point.update_seconds = 1e30;
+    for (int k = 0; k < 3; ++k) {
+        const auto begin = Clock::now();
+        transport.indirect(light);
+        point.update_seconds = std::min(point.update_seconds, seconds_since(begin));
+    }
+    point.error = verifier_.error_of(transfer);
+    return point;
+}
+
+} // namespace afterglow

@@ -1,0 +1,195 @@
+#include "transport/command_chart.h"
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/parallel.h"
+#include "core/progress.h"
+#include "transport/chart.h"
+#include "transport/chart_figures.h"
+#include "transport/cli_options.h"
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace afterglow {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct ChartCommand {
+    std::vector<std::string> scenes;
+    std::string output;
+    bool brief = false;
+    RunOptions run;
+};
+
+Json point_json(const std::string& scene, const ChartPoint& p) {
+    return {{"scene", scene},
+            {"sweep", p.sweep},
+            {"value", p.value},
+            {"seconds", p.seconds},
+            {"update_seconds", p.update_seconds},
+            {"bytes", p.bytes},
+            {"functions", p.functions},
+            {"links", p.links},
+            {"rays", p.rays},
+            {"coarse_radius", p.coarse_radius},
+            {"points_seconds", p.points_seconds},
+            {"push_seconds", p.push_seconds},
+            {"pull_seconds", p.pull_seconds},
+            {"gather_seconds", p.gather_seconds},
+            {"rows_seconds", p.rows_seconds},
+            {"links_seconds", p.links_seconds},
+            {"series_seconds", p.series_seconds},
+            {"tuning_seconds", p.tuning_seconds},
+            {"rel_rmse", p.error.rel_rmse},
+            {"standard_error", p.error.standard_error},
+            {"worst", p.error.worst},
+            {"reference_error", p.error.reference_error}};
+}
+
+/// The processor's name, where the system tells it.
+std::string machine() {
+    std::ifstream file("/proc/cpuinfo");
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("model name")) {
+            const std::size_t colon = line.find(": ");
+            if (colon != std::string::npos) return line.substr(colon + 2);
+        }
+    return "unknown processor";
+}
+
+/// DIR/runs.json: what is measured already, and is not measured again.
+class Runs {
+public:
+    Runs(std::string folder, const RunOptions& run) : folder_(std::move(folder)) {
+        const std::string path = file();
+        head_ = {{"version", AFTERGLOW_VERSION}, {"machine", machine()}, {"threads", thread_count()},
+                 {"seed", run.seed}, {"lights", 3}, {"places", 1000}};
+        if (!std::filesystem::exists(path)) return;
+        std::ifstream stream(path);
+        const Json json = Json::parse(stream, nullptr, false);
+        if (json.is_discarded() || !json.contains("runs") || !json["runs"].is_array())
+            throw FileError(path, "is not what a chart has left here");
+        for (const char* key : {"version", "machine", "threads", "seed"})
+            if (json.value(key, Json()) != head_[key])
+                throw UsageError(path + " was made with another " + key + "; name another folder");
+        runs_ = json["runs"];
+    }
+    /// The point, if it is there.
+    const Json* find(const std::string& scene, const ChartSetting& setting) const {
+        for (const Json& run : runs_)
+            if (run.value("scene", "") == scene && run.value("sweep", "") == setting.sweep
+                && run.value("value", -1.0) == setting.value)
+                return &run;
+        return nullptr;
+    }
+    void add(Json point) {
+        runs_.push_back(std::move(point));
+        Json all = head_;
+        all["runs"] = runs_;
+        write_file(file(), all.dump(1) + "\n");
+        std::ostringstream csv;
+        for (bool first = true; const auto& [key, value] : runs_[0].items()) {
+            csv << (first ? "" : ",") << key;
+            first = false;
+        }
+        csv << "\n";
+        for (const Json& run : runs_) {
+            for (bool first = true; const auto& [key, value] : run.items()) {
+                csv << (first ? "" : ",") << value.dump();
+                first = false;
+            }
+            csv << "\n";
+        }
+        write_file(folder_ + "/runs.csv", csv.str());
+    }
+    std::string file() const { return folder_ + "/runs.json"; }
+
+private:
+    std::string folder_;
+    Json head_, runs_ = Json::array();
+};
+
+void measure_scene(const ChartCommand& command, const std::string& path, Runs& runs) {
+    const std::vector<ChartSetting> settings = chart_settings(command.brief, command.run.seed);
+    const std::string name = path.starts_with("builtin:") ? path : std::filesystem::path(path).stem().string();
+    const bool is_done = std::all_of(settings.begin(), settings.end(), [&](const ChartSetting& setting) {
+        return runs.find(name, setting) != nullptr;
+    });
+    if (is_done) return;
+    const Scene scene = load_scene(path);
+    const Surface surface(scene);
+    if (!command.run.quiet) std::fprintf(stderr, "%s: tracing the reference\n", name.c_str());
+    ChartBench bench(surface, command.output, command.run.seed);
+    for (const ChartSetting& setting : settings) {
+        if (const Json* known = runs.find(name, setting)) {
+            if (setting.sweep == "spacing")
+                bench.set_usual_radius(known->value("coarse_radius", 0.0f) / setting.options.coarse_scale);
+            continue;
+        }
+        const ChartPoint point = bench.measure(setting);
+        if (setting.sweep == "spacing")
+            bench.set_usual_radius(point.coarse_radius / setting.options.coarse_scale);
+        runs.add(point_json(name, point));
+        if (!command.run.quiet)
+            std::fprintf(stderr, "%s: %s %g: error %.1f %% +- %.1f, %s, %.1f MB\n", name.c_str(),
+                         setting.sweep.c_str(), setting.value, 100.0 * point.error.rel_rmse,
+                         100.0 * point.error.standard_error, duration_text(point.seconds).c_str(),
+                         1e-6 * static_cast<double>(point.bytes));
+    }
+}
+
+/// By a Python program that lies beside the figures afterwards, so that anyone can draw them anew.
+void draw(const ChartCommand& command) {
+    const std::string program = command.output + "/figures.py";
+    write_file(program, chart_figures_program);
+    std::string quoted = "'";
+    for (const char c : program) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    quoted += "'";
+    // The system's own Python too, as another in front of it may lack matplotlib.
+    const std::string line = "for python in python3 /usr/bin/python3; do if $python -c 'import matplotlib' 2>/dev/null; "
+                             "then exec $python " + quoted + "; fi; done; exit 1";
+    if (std::system(line.c_str()) != 0)
+        throw Error("the figures could not be drawn; with matplotlib installed, run python3 " + program);
+}
+
+void run(const ChartCommand& command) {
+    const ThreadLimit limit(command.run.threads);
+    std::error_code failed;
+    std::filesystem::create_directories(command.output, failed);
+    if (failed) throw FileError(command.output, failed.message());
+    Runs runs(command.output, command.run);
+    for (const std::string& scene : command.scenes) measure_scene(command, scene, runs);
+    draw(command);
+    if (!command.run.quiet)
+        std::fprintf(stderr, "%s: runs.json, runs.csv, figures as .svg and .png\n", command.output.c_str());
+}
+
+} // namespace
+
+void add_chart_command(CLI::App& app) {
+    CLI::App* sub = app.add_subcommand(
+        "chart", "Sweeps over settings: error against time and bytes, measured and drawn");
+    const auto command = std::make_shared<ChartCommand>();
+    sub->add_option("scenes", command->scenes, "Wavefront OBJ files or builtin:NAME")->required();
+    sub->add_option("-o,--output", command->output,
+                    "Folder; what is measured there already is not measured again")->required();
+    sub->add_flag("--brief", command->brief, "A few coarse points alone, in seconds");
+    add_run_options(*sub, command->run);
+    add_seed_option(*sub, command->run);
+    sub->callback([command] { run(*command); });
+}
+
+} // namespace afterglow
