@@ -201,21 +201,23 @@ TransferOperator tuned_transfer(const PrecomputeCommand& command, const Surface&
     limits.target_error = command.target_error;
     if (command.max_time > 0.0) limits.most_seconds = command.max_time;
     if (command.max_memory > 0.0) limits.most_bytes = 1e9 * command.max_memory;
-    limits.begin_step = [&](int step, float) {
-        progress.emplace("precomputing, step " + std::to_string(step + 1), !command.run.quiet);
+    int number = 0;
+    limits.begin_step = [&] {
+        progress.emplace("precomputing, step " + std::to_string(++number), !command.run.quiet);
+    };
+    limits.end_step = [&](const TuningStep& step) {
+        progress.reset();
+        if (command.run.quiet) return;
+        std::fprintf(stderr, "step %d: spacing %.3g of the usual, error %.1f %% +- %.1f, %s\n", number,
+                     static_cast<double>(step.coarse_scale), 100.0 * step.error.rel_rmse,
+                     100.0 * step.error.standard_error, duration_text(step.seconds).c_str());
     };
     return precompute_to_target(surface, options, limits, report, tuning);
 }
 
-/// How the spacing was chosen, and whether that led to the target.
+/// Says so where the target was not reached.
 void print_tuning(const PrecomputeCommand& command, const TuningReport& tuning,
                   const VerifiedError& verified) {
-    for (std::size_t k = 0; k < tuning.steps.size(); ++k) {
-        const TuningStep& step = tuning.steps[k];
-        std::fprintf(stderr, "step %zu: spacing %.3g of the usual, error %.1f %% +- %.1f, %s\n", k + 1,
-                     static_cast<double>(step.coarse_scale), 100.0 * step.error.rel_rmse,
-                     100.0 * step.error.standard_error, duration_text(step.seconds).c_str());
-    }
     const char* reason = nullptr;
     switch (tuning.end) {
         case TuningEnd::reached: break;

@@ -55,7 +55,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
     for (;;) {
         const double begin = elapsed();
         const int step = static_cast<int>(result.steps.size());
-        if (tuning.begin_step) tuning.begin_step(step, options.coarse_scale);
+        if (tuning.begin_step) tuning.begin_step();
         report = {};
         transfer.reset(); // two at a time would take twice the memory
         transfer = precompute(surface, options, &report);
@@ -67,6 +67,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
                                  .seed = hash64(options.seed, 0x7a5e)});
         result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
         const TuningStep& last = result.steps.back();
+        if (tuning.end_step) tuning.end_step(last);
         const double error = last.error.rel_rmse;
         result.end = TuningEnd::reached;
         if (error <= std::max(safely * tuning.target_error, tuning.target_error - last.error.standard_error)) break;

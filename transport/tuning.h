@@ -14,20 +14,20 @@ namespace afterglow {
 /// small scenes what it takes to say anything.
 std::uint64_t verification_rays(const PrecomputeReport& report);
 
+struct TuningStep {
+    float coarse_scale = 1.0f; // of PrecomputeOptions
+    VerifiedError error;       // under lights and at places that all steps share
+    double seconds = 0.0;
+};
+
 struct TuningOptions {
     double target_error = 0.1; // relRMSE as Verifier::error_of has it
     /// Wall-clock time of all that precompute_to_target() does [s], and resident memory of the process
     /// [byte]: a step that is expected to exceed one is not begun, but the first always is.
     double most_seconds = std::numeric_limits<double>::infinity();
     double most_bytes = std::numeric_limits<double>::infinity();
-    /// Is told before each step.
-    std::function<void(int step, float coarse_scale)> begin_step = {};
-};
-
-struct TuningStep {
-    float coarse_scale = 1.0f; // of PrecomputeOptions
-    VerifiedError error;       // under lights and at places that all steps share
-    double seconds = 0.0;
+    std::function<void()> begin_step = {};                  // is called before each step
+    std::function<void(const TuningStep& step)> end_step = {}; // and after it
 };
 
 enum class TuningEnd { reached, most_seconds, most_bytes, finest };

@@ -49,14 +49,18 @@ private:
         return ray.origin + (0.25f + 0.5f * rng_.uniform()) * length * ray.direction;
     }
 
-    /// Whether the harmonic mean of the distances around is half of what light travels here.
+    /// Whether the harmonic mean of the distances around is half of what light travels here, and most
+    /// of what is around is the scene, as inside it.
     bool is_open(const Vec3& place) const {
         constexpr std::uint32_t rays = 64;
         double inverse = 0.0;
+        std::uint32_t hits = 0;
         for (std::uint32_t k = 0; k < rays; ++k)
-            if (const Hit hit = surface_.closest_hit({place, sample_sphere(scrambled_sobol2(k, 5))}))
+            if (const Hit hit = surface_.closest_hit({place, sample_sphere(scrambled_sobol2(k, 5))})) {
                 inverse += 1.0 / hit.distance;
-        return rays > inverse * source_.mean_ray_length() / 2.0;
+                ++hits;
+            }
+        return 10 * hits >= 6 * rays && hits > inverse * source_.mean_ray_length() / 2.0;
     }
 };
 
@@ -64,7 +68,7 @@ Spotlight random_spotlight(const Surface& surface, FreePlaces& free) {
     Spotlight light;
     light.position = free.next();
     float farthest = -1.0f;
-    for (int k = 0; k < 2; ++k) {
+    for (int k = 0; k < 4; ++k) {
         const Vec3 direction = sample_sphere(free.uniform2());
         const Hit hit = surface.closest_hit({light.position, direction});
         if (const float far = hit ? hit.distance : 0.0f; far > farthest) {

@@ -18,8 +18,8 @@ struct Trial {
 };
 
 /// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the
-/// distances around is at least half of the typical ray length; they shine at what is farther of
-/// two random directions. Places are in sight of these and of as many other places in the open. Empty
+/// distances around is at least half of the typical ray length and six tenths of all directions meet the
+/// scene; they shine at what is farthest of four random directions. Places are in sight of these and of as many other places in the open. Empty
 /// where hardly anything is in sight. `viewpoints` as from find_viewpoints().
 Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
                    std::uint64_t seed);
