@@ -19,11 +19,9 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-constexpr int trial_lights = 3, trial_places = 1000;
-
 VerificationOptions trial_options(std::uint64_t seed) {
-    return {.lights = trial_lights,
-            .places = trial_places,
+    return {.lights = chart_lights,
+            .places = chart_places,
             .reference_error = 0.02,
             .most_rays = 400'000'000,
             .seed = hash64(seed, 0xc4a87)};
@@ -104,16 +102,16 @@ ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
     for (const Spotlight& light : trial.lights) {
         const auto start = Clock::now();
         const IrradianceEstimate estimate = estimate_irradiance(surface_, {&light, 1}, trial.places, tracer);
-        point.seconds += seconds_since(start) / trial_lights;
+        point.seconds += seconds_since(start) / chart_lights;
         point.rays += estimate.rays;
-        squares += estimate.relative_error[0] * estimate.relative_error[0] / trial_lights;
+        squares += estimate.relative_error[0] * estimate.relative_error[0] / chart_lights;
         point.error.worst = std::max(point.error.worst, estimate.relative_error[0]);
     }
     constexpr double pixels = 1280.0 * 720.0;
     point.seconds *= pixels / static_cast<double>(trial.places.size());
     point.error.rel_rmse = std::sqrt(squares);
-    point.error.lights = trial_lights;
-    point.error.places = trial_places;
+    point.error.lights = chart_lights;
+    point.error.places = chart_places;
     return point;
 }
 

@@ -12,6 +12,9 @@
 
 namespace afterglow {
 
+/// Of the trial that all points of a scene share.
+inline constexpr int chart_lights = 3, chart_places = 1000;
+
 /// One way to precompute a scene (or to trace its paths), and what came of it: a point of a chart.
 struct ChartPoint {
     std::string sweep;  // as in chart_settings()

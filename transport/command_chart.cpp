@@ -76,7 +76,7 @@ public:
     Runs(std::string folder, const RunOptions& run) : folder_(std::move(folder)) {
         const std::string path = file();
         head_ = {{"version", AFTERGLOW_VERSION}, {"machine", machine()}, {"threads", thread_count()},
-                 {"seed", run.seed}, {"lights", 3}, {"places", 1000}};
+                 {"seed", run.seed}, {"lights", chart_lights}, {"places", chart_places}};
         if (!std::filesystem::exists(path)) return;
         std::ifstream stream(path);
         const Json json = Json::parse(stream, nullptr, false);
