@@ -165,7 +165,7 @@ def break_even():
     axes.set_ylabel("precomputation / path traced picture")
     axes.set_title("Break-even with one picture of 1280 x 720 pixels and equal error")
     axes.legend(fontsize=7)
-    finish(figure, "break_even", f"{len(scenes)} scenes")
+    finish(figure, "break_even", f"{len(scenes)} scene{'s' if len(scenes) > 1 else ''}")
 
 
 for scene in scenes:

@@ -17,7 +17,7 @@ constexpr int most_steps = 5;
 // Shares of the target, as errors are known to a tenth: what a step aims at, and what is good enough.
 constexpr double aim = 0.8, safely = 0.9;
 constexpr double expected_order = 0.9; // of the error in the spacing
-constexpr double time_order = 1.1, memory_order = 1.5;
+constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
 
 /// The largest resident memory of this process so far [byte].
 double peak_memory() {
@@ -48,7 +48,8 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
     const auto start = Clock::now();
     const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
     const double memory_before = peak_memory();
-    options.links.target_error = tuning.target_error;
+    // Smaller thresholds than usual make larger files, but no smaller errors (docs/charts.md).
+    options.links.target_error = std::max(LinkOptions().target_error, tuning.target_error);
     options.coarse_scale = first_scale;
     std::optional<TransferOperator> transfer;
     result = {};
@@ -69,7 +70,6 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         const TuningStep& last = result.steps.back();
         if (tuning.end_step) tuning.end_step(last);
         const double error = last.error.rel_rmse;
-        result.end = TuningEnd::reached;
         if (error <= std::max(safely * tuning.target_error, tuning.target_error - last.error.standard_error)) break;
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
@@ -80,11 +80,11 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         // As fine as the limits let it be, if that is worth a step.
         const double coarsest_worthwhile = 0.8 * last.coarse_scale;
         const double of_time = last.coarse_scale
-                               * std::pow(last.seconds / std::max(1e-9, tuning.most_seconds - elapsed()), 1.0 / time_order);
+                               * std::pow(last.seconds / std::max(1e-9, tuning.most_seconds - elapsed()), 1.0 / cost_order);
         const double of_memory =
             last.coarse_scale
             * std::pow((peak_memory() - memory_before) / std::max(1.0, tuning.most_bytes - memory_before),
-                       1.0 / memory_order);
+                       1.0 / cost_order);
         if (std::max(of_time, of_memory) > scale) {
             scale = std::max(of_time, of_memory);
             if (scale > coarsest_worthwhile) {
@@ -94,6 +94,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         }
         options.coarse_scale = static_cast<float>(scale);
     }
+    if (result.steps.back().error.rel_rmse <= tuning.target_error) result.end = TuningEnd::reached;
     return std::move(*transfer);
 }
 

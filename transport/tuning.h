@@ -41,7 +41,8 @@ struct TuningReport {
 /// tracer under six random lights; error goes about like a power of the spacing, near one, so that
 /// the next step's spacing follows; and so on until the target is met. Mostly two steps, of which the
 /// first takes a small part of the time. Other lights and places should tell how well it went, as the
-/// steps were chosen by these. What is dropped of links follows the target too (link_threshold()).
+/// steps were chosen by these. Above 10 %, what is dropped of links follows the target too
+/// (link_threshold()).
 ///
 /// options.coarse_radius must be 0, and the operator neumann. With a limit of time the result depends
 /// on the machine.
