@@ -92,6 +92,7 @@ Json options_json(const PrecomputeCommand& command) {
         json["epsilon"] = std::stod(number_text(*options.links.threshold));
     else
         json["target_error"] = command.target_error;
+    if (command.draft) json["draft"] = true;
     if (options.viewpoint) json["viewpoint"] = vector_json(*options.viewpoint);
     return json;
 }
@@ -223,6 +224,7 @@ void print_tuning(const PrecomputeCommand& command, const TuningReport& tuning,
         case TuningEnd::reached: break;
         case TuningEnd::most_seconds: reason = "a finer step would exceed --max-time"; break;
         case TuningEnd::most_bytes: reason = "a finer step would exceed --max-memory"; break;
+        case TuningEnd::nothing_to_compare: reason = "there is no indirect light to compare with"; break;
         case TuningEnd::finest: reason = "finer functions would not help"; break;
     }
     if (!reason && verified.any() && verified.rel_rmse > 1.2 * command.target_error)

@@ -69,6 +69,12 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
         const TuningStep& last = result.steps.back();
         if (tuning.end_step) tuning.end_step(last);
+        if (!last.error.any()) { // then the usual spacing
+            result.end = TuningEnd::nothing_to_compare;
+            if (last.coarse_scale <= 1.0f) return std::move(*transfer);
+            options.coarse_scale = 1.0f;
+            continue;
+        }
         const double error = last.error.rel_rmse;
         if (error <= std::max(safely * tuning.target_error, tuning.target_error - last.error.standard_error)) break;
         result.end = TuningEnd::finest;

@@ -30,7 +30,9 @@ struct TuningOptions {
     std::function<void(const TuningStep& step)> end_step = {}; // and after it
 };
 
-enum class TuningEnd { reached, most_seconds, most_bytes, finest };
+/// finest: a quarter of the usual spacing, or five steps, did not do; nothing_to_compare: no light of the
+/// trial shows up anywhere, and the spacing is the usual one.
+enum class TuningEnd { reached, most_seconds, most_bytes, finest, nothing_to_compare };
 
 struct TuningReport {
     std::vector<TuningStep> steps; // from coarse to fine; the last one is the result

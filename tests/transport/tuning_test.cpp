@@ -11,14 +11,14 @@ namespace afterglow {
 namespace {
 
 struct Tuned {
-    Scene scene = make_builtin_scene("builtin:cornell");
+    Scene scene;
     Surface surface{scene};
     PrecomputeReport report;
     TuningReport tuning;
     TransferOperator transfer;
 
-    explicit Tuned(const TuningOptions& options)
-        : transfer(precompute_to_target(surface, PrecomputeOptions(), options, report, tuning)) {}
+    explicit Tuned(const TuningOptions& options, const char* name = "builtin:cornell")
+        : scene(make_builtin_scene(name)), transfer(precompute_to_target(surface, PrecomputeOptions(), options, report, tuning)) {}
     const TuningStep& last() const { return tuning.steps.back(); }
 };
 
@@ -71,6 +71,12 @@ TEST(Tuning, GivesTheBestItHasWithinItsLimits) {
     EXPECT_GT(limited.tuning.steps.size(), 1u);
     EXPECT_EQ(limited.tuning.end, TuningEnd::most_seconds);
     EXPECT_LT(limited.last().coarse_scale, hurried.last().coarse_scale);
+}
+
+TEST(Tuning, TakesTheUsualSpacingWhereThereIsNothingToCompare) {
+    const Tuned black({.target_error = 0.1}, "builtin:furnace:0");
+    EXPECT_EQ(black.tuning.end, TuningEnd::nothing_to_compare);
+    EXPECT_EQ(black.last().coarse_scale, 1.0f);
 }
 
 } // namespace
