@@ -304,10 +304,11 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
         throw UsageError("--max-time must be positive");
     if (given("--max-memory") && !(command.max_memory > 0.0))
         throw UsageError("--max-memory must be positive");
-    command.tuned = given("--target-error") || given("--max-time") || given("--max-memory");
-    if (command.tuned && (given("--coarse-radius") || given("--epsilon") || command.operator_name == "paper"))
-        throw UsageError("--target-error, --max-time and --max-memory choose what --coarse-radius and "
-                         "--epsilon say; give these or those (--operator paper knows only the latter)");
+    const bool limited = given("--max-time") || given("--max-memory");
+    if (limited && (given("--coarse-radius") || given("--epsilon") || command.operator_name == "paper"))
+        throw UsageError("--max-time and --max-memory limit the search for a spacing; give these or "
+                         "--coarse-radius, --epsilon and --operator paper");
+    command.tuned = limited || (given("--target-error") && !given("--coarse-radius"));
     if (command.draft && (command.tuned || given("--coarse-radius")))
         throw UsageError("--draft chooses the spacing itself");
     if (given("--epsilon") && !(command.epsilon >= 0.0))
@@ -340,7 +341,8 @@ void add_precompute_command(CLI::App& app) {
     CLI::Option* target_error =
         add_number(*sub, "--target-error", command->target_error,
                    "Relative error of the indirect irradiance to aim at: the spacing follows, by steps "
-                   "that are compared with the path tracer (default: the usual spacing, in one step)");
+                   "that are compared with the path tracer (default: the usual spacing, in one step); with "
+                   "--coarse-radius, what dropped links may make");
     add_number(*sub, "--max-time", command->max_time,
                "Seconds that --target-error (default 0.1) may take: the best that is reached by then");
     add_number(*sub, "--max-memory", command->max_memory, "Gigabytes that it may take");

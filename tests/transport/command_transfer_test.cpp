@@ -75,7 +75,7 @@ TEST_F(CommandTransfer, WhatPrecomputeCannotDoIsStatusTwoAndLeavesNothing) {
                                 "--epsilon -1",
                                 "--epsilon 0.1 --target-error 0.1",
                                 "--epsilon 0.1 --max-time 5",
-                                "--coarse-radius 0.2 --target-error 0.1",
+                                "--coarse-radius 0.2 --max-time 5",
                                 "--coarse-radius 0.2 --draft",
                                 "--draft --target-error 0.1",
                                 "--max-time 0",
@@ -119,6 +119,10 @@ TEST_F(CommandTransfer, TargetErrorTellsItsStepsAndWhatItCouldNotReach) {
     EXPECT_NE(made.err.find("verified error"), std::string::npos) << made.err;
     EXPECT_EQ(made.err.find("not reached"), std::string::npos) << made.err;
     EXPECT_NE(content_of(folder.path("r.json")).find("\"tuning\": ["), std::string::npos);
+
+    const Outcome by_hand = run(start + " --target-error 0.2" + small_settings);
+    EXPECT_EQ(by_hand.status, 0) << by_hand.err;
+    EXPECT_EQ(by_hand.err.find("step"), std::string::npos) << by_hand.err;
 
     const Outcome hurried = run(start + " --target-error 0.001 --max-time 0.01");
     EXPECT_EQ(hurried.status, 0) << hurried.err;
