@@ -1,6 +1,8 @@
 #include "transport/chart.h"
 
+#include "core/error.h"
 #include "core/sampling.h"
+#include "core/seconds.h"
 #include "transport/path_tracer.h"
 #include "transport/transfer_file.h"
 #include "transport/tuning.h"
@@ -14,10 +16,6 @@ namespace afterglow {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 VerificationOptions trial_options(std::uint64_t seed) {
     return {.lights = chart_lights,
@@ -84,12 +82,12 @@ std::vector<ChartSetting> chart_settings(bool brief, std::uint64_t seed) {
 
 ChartBench::ChartBench(const Surface& surface, std::string folder, std::uint64_t seed)
     : surface_(surface), folder_(std::move(folder)), seed_(seed),
-      viewpoints_(find_viewpoints(surface, seed)),
-      verifier_(surface, viewpoints_, trial_options(seed)) {}
+      verifier_(surface, find_viewpoints(surface, seed), trial_options(seed)) {
+    if (verifier_.trial().places.empty()) throw Error("hardly anything is in sight: there is nothing to chart");
+}
 
 ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
-    const VerificationOptions options = trial_options(seed_);
-    const Trial trial = random_trial(surface_, viewpoints_, options.lights, options.places, options.seed);
+    const Trial& trial = verifier_.trial();
     ChartPoint point;
     point.sweep = setting.sweep;
     point.value = setting.value;
@@ -139,7 +137,7 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     point.series_seconds = report.series_seconds;
     point.tuning_seconds = point.seconds - report.total_seconds;
     point.functions = transfer.points.size();
-    for (int l = 0; l < transfer.points.levels(); ++l) point.links += transfer.link_count(l);
+    point.links = transfer.link_count();
     point.rays = report.links.rays + report.points_rays;
     point.coarse_radius = transfer.points.spacing[0];
 
@@ -149,12 +147,10 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     std::filesystem::remove(file);
 
     const LightTransport transport(transfer, surface_);
-    const VerificationOptions trial = trial_options(seed_);
-    const Spotlight light = random_trial(surface_, viewpoints_, 1, 1, trial.seed).lights.at(0);
     point.update_seconds = 1e30;
     for (int k = 0; k < 3; ++k) {
         const auto begin = Clock::now();
-        transport.indirect(light);
+        transport.indirect(verifier_.trial().lights[0]);
         point.update_seconds = std::min(point.update_seconds, seconds_since(begin));
     }
     point.error = verifier_.error_of(transfer);

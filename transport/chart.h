@@ -5,7 +5,6 @@
 #include "transport/verification.h"
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,6 +57,7 @@ std::vector<ChartSetting> chart_settings(bool brief, std::uint64_t seed);
 class ChartBench {
 public:
     /// `folder`: where a transfer file lies while its size is read. Keeps a reference to the surface.
+    /// Throws Error where hardly anything is in sight.
     ChartBench(const Surface& surface, std::string folder, std::uint64_t seed);
     ChartPoint measure(const ChartSetting& setting) const;
     /// R_0 that precompute() finds by itself [world]: of the first point with one.
@@ -67,7 +67,6 @@ private:
     const Surface& surface_;
     std::string folder_;
     std::uint64_t seed_;
-    std::vector<Vec3> viewpoints_;
     Verifier verifier_;
     float usual_radius_ = 0.0f;
 

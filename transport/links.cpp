@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "core/sampling.h"
+#include "core/seconds.h"
 #include "transport/accumulator.h"
 
 #include <algorithm>
@@ -13,10 +14,6 @@ namespace afterglow {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
 /// The links of a receiver as its children read them when they predict: all that it and its
 /// ancestors stored, summed up by push, but for what is negligible to the children.
 struct PushedRow {

@@ -2,6 +2,7 @@
 
 #include "basis/poisson_disk.h"
 #include "core/error.h"
+#include "core/seconds.h"
 #include "transport/paper_links.h"
 #include "transport/paper_series.h"
 
@@ -14,10 +15,6 @@ namespace afterglow {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// The coarsest spacing as a share of the typical ray length: a few functions a room. With the
 /// default levels the finest senders are 1/25 of that length apart.

@@ -1,6 +1,7 @@
 #include "transport/tuning.h"
 
 #include "core/sampling.h"
+#include "core/seconds.h"
 
 #include <sys/resource.h>
 
@@ -44,9 +45,8 @@ std::uint64_t verification_rays(const PrecomputeReport& report) {
 TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions options,
                                       const TuningOptions& tuning, PrecomputeReport& report,
                                       TuningReport& result) {
-    using Clock = std::chrono::steady_clock;
-    const auto start = Clock::now();
-    const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
+    const auto start = std::chrono::steady_clock::now();
+    const auto elapsed = [&] { return seconds_since(start); };
     const double memory_before = peak_memory();
     // Smaller thresholds than usual make larger files, but no smaller errors (docs/charts.md).
     options.links.target_error = std::max(LinkOptions().target_error, tuning.target_error);

@@ -19,8 +19,8 @@ struct Trial {
 
 /// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the
 /// distances around is at least half of the typical ray length and six tenths of all directions meet the
-/// scene; they shine at what is farthest of four random directions. Places are in sight of these and of as many other places in the open. Empty
-/// where hardly anything is in sight. `viewpoints` as from find_viewpoints().
+/// scene; they shine at what is farthest of four random directions. Places are in sight of these and of
+/// as many other places in the open. Empty where hardly anything is in sight. `viewpoints` as from find_viewpoints().
 Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
                    std::uint64_t seed);
 
@@ -52,6 +52,7 @@ public:
     /// Lights and places depend on the seed and the scene alone. Keeps a reference to the surface.
     Verifier(const Surface& surface, const std::vector<Vec3>& viewpoints,
              const VerificationOptions& options);
+    const Trial& trial() const { return trial_; }
     /// Nothing (any() is false) where hardly anything is in sight.
     VerifiedError error_of(const TransferOperator& transfer) const;
 
