@@ -19,7 +19,6 @@
 #include <memory>
 #include <sstream>
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace afterglow {
@@ -34,8 +33,9 @@ struct ChartCommand {
     RunOptions run;
 };
 
-Json point_json(const std::string& scene, const ChartPoint& p) {
+Json point_json(const std::string& scene, const std::string& hash, const ChartPoint& p) {
     return {{"scene", scene},
+            {"scene_hash", hash},
             {"sweep", p.sweep},
             {"value", p.value},
             {"seconds", p.seconds},
@@ -95,6 +95,12 @@ public:
                 return &run;
         return nullptr;
     }
+    /// Throws UsageError where points of another scene go by this name.
+    void expect_scene(const std::string& scene, const std::string& hash) const {
+        for (const Json& run : runs_)
+            if (run.value("scene", "") == scene && run.value("scene_hash", "") != hash)
+                throw UsageError(file() + " has points of another scene called " + scene + "; name another folder");
+    }
     void add(Json point) {
         runs_.push_back(std::move(point));
         Json all = head_;
@@ -125,29 +131,29 @@ private:
 void measure_scene(const ChartCommand& command, const std::string& path, Runs& runs) {
     const std::vector<ChartSetting> settings = chart_settings(command.brief, command.run.seed);
     const std::string name = path.starts_with("builtin:") ? path : std::filesystem::path(path).stem().string();
+    const Scene scene = load_scene(path);
+    const std::string hash = scene.content_hash();
+    runs.expect_scene(name, hash);
     const bool is_done = std::all_of(settings.begin(), settings.end(), [&](const ChartSetting& setting) {
         return runs.find(name, setting) != nullptr;
     });
     if (is_done) return;
-    const Scene scene = load_scene(path);
     const Surface surface(scene);
     if (!command.run.quiet) std::fprintf(stderr, "%s: tracing the reference\n", name.c_str());
     ChartBench bench(surface, command.output, command.run.seed);
     for (const ChartSetting& setting : settings) {
-        if (const Json* known = runs.find(name, setting)) {
-            if (setting.sweep == "spacing")
-                bench.set_usual_radius(known->value("coarse_radius", 0.0f) / setting.options.coarse_scale);
-            continue;
+        if (!runs.find(name, setting)) {
+            const ChartPoint point = bench.measure(setting);
+            runs.add(point_json(name, hash, point));
+            if (!command.run.quiet)
+                std::fprintf(stderr, "%s: %s %g: error %.1f %% +- %.1f, %s, %.1f MB\n", name.c_str(),
+                             setting.sweep.c_str(), setting.value, 100.0 * point.error.rel_rmse,
+                             100.0 * point.error.standard_error, duration_text(point.seconds).c_str(),
+                             1e-6 * static_cast<double>(point.bytes));
         }
-        const ChartPoint point = bench.measure(setting);
         if (setting.sweep == "spacing")
-            bench.set_usual_radius(point.coarse_radius / setting.options.coarse_scale);
-        runs.add(point_json(name, point));
-        if (!command.run.quiet)
-            std::fprintf(stderr, "%s: %s %g: error %.1f %% +- %.1f, %s, %.1f MB\n", name.c_str(),
-                         setting.sweep.c_str(), setting.value, 100.0 * point.error.rel_rmse,
-                         100.0 * point.error.standard_error, duration_text(point.seconds).c_str(),
-                         1e-6 * static_cast<double>(point.bytes));
+            bench.set_usual_radius(runs.find(name, setting)->value("coarse_radius", 0.0f)
+                                   / setting.options.coarse_scale);
     }
 }
 

@@ -45,6 +45,11 @@ TEST(CommandChart, MeasuresDrawsAndGoesOnWhereItWas) {
         EXPECT_EQ(last[key], again[key]) << key;
 
     EXPECT_EQ(run(start + " --seed 2").status, 2); // of which nothing is known here
+    cut["runs"][0]["scene_hash"] = "another";
+    write_file(runs, cut.dump());
+    const Outcome another = run(start);
+    EXPECT_EQ(another.status, 2);
+    EXPECT_NE(another.err.find("another scene"), std::string::npos) << another.err;
     write_file(runs, "{\"runs\": [");
     const Outcome damaged = run(start);
     EXPECT_EQ(damaged.status, 1);
