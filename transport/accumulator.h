@@ -1,47 +1,51 @@
 #pragma once
 
-#include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace afterglow {
 
-/// A dense vector that knows in which blocks of sixteen places it was written, so that it is read in
-/// order and cleared at the cost of what is in it.
+/// A dense vector with a bit a place that says whether it was written, so that it is read in order
+/// and cleared at the cost of what is in it.
 template <class Value>
 class Accumulator {
 public:
     Accumulator(std::size_t size, const Value& zero)
-        : zero_(zero), value_((size + block - 1) / block * block, zero), used_(value_.size() / block, 0) {}
+        : zero_(zero), value_(size, zero), written_((size + bits - 1) / bits, 0) {}
 
     Value& at(std::uint32_t i) {
-        used_[i / block] = 1;
+        written_[i / bits] |= std::uint64_t{1} << (i % bits);
         return value_[i];
     }
-    /// Calls visit(i, value) for the written places in [begin, end), increasing (and for places of
-    /// the same blocks that still hold zero); visit may write outside that range.
+    /// Calls visit(i, value) for the written places in [begin, end), increasing; visit may write
+    /// outside that range.
     template <class Visit>
     void for_each(std::uint32_t begin, std::uint32_t end, const Visit& visit) const {
-        for (std::uint32_t b = begin / block; b * block < end; ++b) {
-            if (!used_[b]) continue;
-            const std::uint32_t last = std::min(end, (b + 1) * block);
-            for (std::uint32_t i = std::max(begin, b * block); i < last; ++i) visit(i, value_[i]);
+        for (std::uint32_t w = begin / bits; w * bits < end; ++w) {
+            std::uint64_t left = written_[w];
+            if (w * bits < begin) left &= ~std::uint64_t{0} << (begin % bits);
+            if (end - w * bits < bits) left &= ~(~std::uint64_t{0} << (end % bits));
+            for (; left != 0; left &= left - 1) {
+                const std::uint32_t i = w * bits + static_cast<std::uint32_t>(std::countr_zero(left));
+                visit(i, value_[i]);
+            }
         }
     }
     void clear() {
-        for (std::size_t b = 0; b < used_.size(); ++b) {
-            if (!used_[b]) continue;
-            std::fill_n(value_.begin() + static_cast<std::ptrdiff_t>(b * block), block, zero_);
-            used_[b] = 0;
+        for (std::uint32_t w = 0; w < written_.size(); ++w) {
+            for (std::uint64_t left = written_[w]; left != 0; left &= left - 1)
+                value_[w * bits + static_cast<std::uint32_t>(std::countr_zero(left))] = zero_;
+            written_[w] = 0;
         }
     }
 
 private:
-    static constexpr std::uint32_t block = 16;
+    static constexpr std::uint32_t bits = 64;
     Value zero_;
     std::vector<Value> value_;
-    std::vector<std::uint8_t> used_;
+    std::vector<std::uint64_t> written_;
 };
 
 } // namespace afterglow
