@@ -226,6 +226,51 @@ TEST(Surface, LetsNoRayEscapeFromClosedScenes) {
     }
 }
 
+/// A closed cube of n x n x 2 triangles a face, blown up to a ball where `round`; off the origin.
+Scene closed_shell(int n, bool round) {
+    Scene scene;
+    scene.materials.push_back({"white", Rgb::Ones(), no_index});
+    for (int face = 0; face < 6; ++face) {
+        const auto first = static_cast<std::uint32_t>(scene.positions.size());
+        const auto row = static_cast<std::uint32_t>(n) + 1;
+        for (int y = 0; y <= n; ++y)
+            for (int x = 0; x <= n; ++x) {
+                Vec3 p;
+                p[face / 2] = face % 2 ? 1.0f : -1.0f;
+                p[(face / 2 + 1) % 3] = 2.0f * static_cast<float>(x) / static_cast<float>(n) - 1.0f;
+                p[(face / 2 + 2) % 3] = 2.0f * static_cast<float>(y) / static_cast<float>(n) - 1.0f;
+                if (round) p.normalize();
+                scene.positions.push_back(3.7f * p + Vec3(5.3f, 1.1f, -7.7f));
+            }
+        for (std::uint32_t q = 0; q < row * row - row; ++q) {
+            if (q % row == row - 1) continue;
+            scene.triangles.push_back({first + q, first + q + 1, first + q + row + 1});
+            scene.triangles.push_back({first + q, first + q + row + 1, first + q + row});
+        }
+    }
+    scene.material_index.resize(scene.triangles.size());
+    return scene;
+}
+
+TEST(Surface, LetsNoRaySlipThroughBetweenTwoTriangles) {
+    for (const bool round : {false, true}) {
+        const Scene scene = closed_shell(60, round);
+        const Surface surface(scene);
+        std::atomic<int> escaped = 0;
+        // At edges and corners, where rounding decides.
+        parallel_for(200'000, [&](Index i) {
+            Rng rng(11, static_cast<std::uint64_t>(i));
+            const Vec3 from = Vec3(5.3f, 1.1f, -7.7f) + 1.9f * random_point(rng);
+            const Triangle& t = scene.triangles[rng.next() % scene.triangles.size()];
+            const float along = i % 4 == 0 ? 0.0f : rng.uniform();
+            const Vec3 at = (1.0f - along) * scene.positions[t[0]] + along * scene.positions[t[1]];
+            escaped += !surface.closest_hit({from, (at - from).normalized()});
+            escaped += !surface.occluded({from, (at - from).normalized()});
+        });
+        EXPECT_EQ(escaped, 0);
+    }
+}
+
 TEST(Surface, OfAnEmptySceneIsNeverMet) {
     const Scene scene;
     const Surface surface(scene);
