@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
 
 namespace afterglow {
@@ -38,33 +39,27 @@ public:
         : surface_(surface), options_(options),
           probe_(surface, options.spacing) {}
 
-    std::int32_t cell_of(const Vec3& x) {
-        CellKey key;
-        for (int a = 0; a < 3; ++a) key[a] = static_cast<std::int32_t>(std::floor(x[a] / options_.spacing));
-        if (const auto found = index_.find(key); found != index_.end()) return found->second;
-        const auto id = static_cast<std::int32_t>(cells_.size());
-        Cell& cell = cells_.emplace_back();
-        cell.parity = (key[0] & 1) | (key[1] & 1) << 1 | (key[2] & 1) << 2;
-        index_.emplace(key, id);
-        for (int k = 0; k < 27; ++k) {
-            const auto near = index_.find({key[0] + k % 3 - 1, key[1] + k / 3 % 3 - 1, key[2] + k / 9 - 1});
-            cell.neighbour[k] = near == index_.end() ? -1 : near->second;
-            if (near != index_.end()) cells_[near->second].neighbour[26 - k] = id;
-        }
-        return id;
-    }
-
     /// Throws the candidates [begin, end) of the source; accepted[i] tells of begin + i.
     /// `refining`: the openness feature may add points closer than R.
     void throw_darts(const CandidateSource& source, std::size_t begin, std::size_t end, bool refining,
                      std::vector<char>& accepted) {
-        accepted.assign(end - begin, 0);
+        const std::size_t count = end - begin;
+        accepted.assign(count, 0);
+        features_.assign(count, std::nullopt);
+        // Most conflict with darts of earlier rounds already, in whatever order they are looked at.
+        std::vector<char> fits_so_far(count);
+        parallel_for(static_cast<Index>(count), [&](Index i) {
+            const SurfacePoint& x = source[begin + i].at;
+            const auto cell = index_.find(key_of(x.position));
+            fits_so_far[i] = cell == index_.end() || fits(cells_[cell->second], x, refining, features_[i]);
+        });
         std::array<std::vector<std::int32_t>, 8> classes;
-        for (std::size_t i = begin; i < end; ++i) {
-            const std::int32_t id = cell_of(source[i].at.position);
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!fits_so_far[i]) continue;
+            const std::int32_t id = cell_of(source[begin + i].at.position);
             Cell& cell = cells_[id];
             if (cell.waiting.empty()) classes[cell.parity].push_back(id);
-            cell.waiting.push_back(static_cast<std::uint32_t>(i - begin));
+            cell.waiting.push_back(static_cast<std::uint32_t>(i));
         }
         for (const auto& same_parity : classes)
             parallel_for(
@@ -72,7 +67,7 @@ public:
                 [&](Index c) {
                     Cell& cell = cells_[same_parity[c]];
                     for (const std::uint32_t i : cell.waiting)
-                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, refining);
+                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, refining, features_[i]);
                     cell.waiting.clear();
                 },
                 16);
@@ -130,7 +125,9 @@ private:
         }
     }
 
-    bool try_dart(Cell& cell, const SurfacePoint& x, std::size_t candidate, bool refining) {
+    /// Whether x, in this cell, conflicts with no dart that is there. Sets the feature where it decides.
+    bool fits(const Cell& cell, const SurfacePoint& x, bool refining,
+              std::optional<Openness>& feature) const {
         const float s = options_.openness_density;
         bool conflict = false;
         if (!refining) {
@@ -138,10 +135,7 @@ private:
                 conflict = true;
                 return false;
             });
-            if (conflict) return false;
-            if (options_.skip_narrow && narrow(x)) return false;
-            cell.darts.push_back({x, candidate, s > 0.0f ? probe_(x) : Openness::Zero()});
-            return true;
+            return !conflict;
         }
         struct Near {
             const Dart* dart;
@@ -155,18 +149,47 @@ private:
             return !conflict;
         });
         if (conflict) return false;
-        const Openness feature = probe_(x);
-        for (int k = 0; k < count; ++k) {
-            const float difference2 = openness_difference2(feature, near[k].dart->openness);
-            if (near[k].distance * std::exp(difference2 / (2.0f * s * s)) < options_.spacing) return false;
-        }
-        cell.darts.push_back({x, candidate, feature});
+        if (!feature) feature = probe_(x);
+        return std::none_of(near.begin(), near.begin() + count, [&](const Near& n) {
+            const float difference2 = openness_difference2(*feature, n.dart->openness);
+            return n.distance * std::exp(difference2 / (2.0f * s * s)) < options_.spacing;
+        });
+    }
+
+    bool try_dart(Cell& cell, const SurfacePoint& x, std::size_t candidate, bool refining,
+                  std::optional<Openness>& feature) const {
+        if (!fits(cell, x, refining, feature)) return false;
+        if (!refining && options_.skip_narrow && narrow(x)) return false;
+        if (!feature) feature = options_.openness_density > 0.0f ? probe_(x) : Openness::Zero();
+        cell.darts.push_back({x, candidate, *feature});
         return true;
+    }
+
+    CellKey key_of(const Vec3& x) const {
+        CellKey key;
+        for (int a = 0; a < 3; ++a) key[a] = static_cast<std::int32_t>(std::floor(x[a] / options_.spacing));
+        return key;
+    }
+
+    std::int32_t cell_of(const Vec3& x) {
+        const CellKey key = key_of(x);
+        if (const auto found = index_.find(key); found != index_.end()) return found->second;
+        const auto id = static_cast<std::int32_t>(cells_.size());
+        Cell& cell = cells_.emplace_back();
+        cell.parity = (key[0] & 1) | (key[1] & 1) << 1 | (key[2] & 1) << 2;
+        index_.emplace(key, id);
+        for (int k = 0; k < 27; ++k) {
+            const auto near = index_.find({key[0] + k % 3 - 1, key[1] + k / 3 % 3 - 1, key[2] + k / 9 - 1});
+            cell.neighbour[k] = near == index_.end() ? -1 : near->second;
+            if (near != index_.end()) cells_[near->second].neighbour[26 - k] = id;
+        }
+        return id;
     }
 
     const Surface& surface_;
     const PoissonDiskOptions& options_;
     OpennessProbe probe_;
+    std::vector<std::optional<Openness>> features_; // of this round's candidates
     std::vector<Cell> cells_;
     std::unordered_map<CellKey, std::int32_t, CellHash> index_;
 };
