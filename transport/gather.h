@@ -11,6 +11,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace afterglow {
@@ -47,7 +48,13 @@ public:
     GatherDirections(int rays, std::uint64_t seed);
     int rays() const { return static_cast<int>(sobol_.size()); }
     /// directions: rays() columns about +z.
-    void deal(Index receiver, Eigen::Matrix3Xf& directions) const;
+    void deal(Index receiver, Eigen::Matrix3Xf& directions) const {
+        directions.resize(3, rays());
+        deal(receiver, 0, directions);
+    }
+    /// Those of the points [first, first + directions.cols()) of a receiver's share, about +z; first and
+    /// count multiples of a power of two make a well spread set.
+    void deal(Index receiver, int first, Eigen::Matrix3Xf& directions) const;
 
 private:
     std::vector<std::array<std::uint32_t, 2>> sobol_; // the first `rays` points
@@ -58,9 +65,16 @@ private:
 /// SenderRows::see.
 std::vector<Hit> arrivals(const Surface& surface, const PointHierarchy& points, std::uint64_t seed);
 
-/// Traces all gather rays of the points [begin, end): samples[(i - begin) * rays + k].
+/// Of the rays of each receiver, those from `first` on.
+struct RayRange {
+    int first, count;
+};
+
+/// Traces these gather rays of `receivers`, points of a level that begins with first_receiver:
+/// samples[r * directions.rays() + k] for k in the range. `samples` has room for all.
 void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
-                  Index begin, Index end, Index first_receiver, const GatherDirections& directions,
-                  const Footprint& footprint, std::vector<GatherSample>& samples);
+                  std::span<const std::uint32_t> receivers, Index first_receiver,
+                  const GatherDirections& directions, RayRange range, const Footprint& footprint,
+                  std::span<GatherSample> samples);
 
 } // namespace afterglow

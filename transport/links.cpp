@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <numeric>
 
 namespace afterglow {
 namespace {
@@ -28,6 +29,12 @@ struct LevelThresholds {
     float negligible; // what a pushed link must exceed to be predicted for the children
 };
 
+/// A display receiver casts a quarter of its rays first, and no more where no link that they show is this
+/// much larger than its threshold: two of five need no links. Those of the coarsest senders are the
+/// noisiest beside it. Counts in docs/performance.md.
+constexpr int first_rays_divisor = 4;
+constexpr float expecting = 1.5f, expecting_coarsest = 6.0f;
+
 /// What a thread needs to turn samples into the row of a receiver.
 class RowMaker {
 public:
@@ -43,18 +50,39 @@ public:
     void make(Index i, int level, std::span<const GatherSample> samples,
               std::span<const PushedRow> parents, const LevelThresholds& thresholds,
               std::vector<PackedLink>& kept, PushedRow& pushed, std::uint64_t& links_before) {
-        gather(samples);
+        gather(samples, 1.0f);
         difference_senders(thresholds.kept[0]);
         if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
         threshold(level, thresholds.kept, kept, links_before);
         if (thresholds.has_children) push_down(thresholds.negligible, pushed);
+        clear();
+    }
+
+    /// Whether the first samples of a receiver, a `share` of them, let expect that links will be stored.
+    bool expects_links(Index i, int level, std::span<const GatherSample> samples, float share,
+                       std::span<const PushedRow> parents, const LevelThresholds& thresholds) {
+        gather(samples, 1.0f / share);
+        difference_senders(thresholds.kept[0]);
+        if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
+        bool found = false;
+        for (int k = 0; k < sender_levels_ && !found; ++k) {
+            const float limit = (k == 0 ? expecting_coarsest : expecting) * thresholds.kept[k];
+            link_.for_each(points_.begin(k), points_.end(k), [&](std::uint32_t, const LinkVector& d) {
+                found |= d.squaredNorm() > limit * limit;
+            });
+        }
+        clear();
+        return found;
+    }
+
+private:
+    void clear() {
         link_.clear();
         predicted_.clear();
     }
 
-private:
-    /// Raw links: first to sender values, then, by the transpose of push, to sender coefficients.
-    void gather(std::span<const GatherSample> samples) {
+    /// Raw links, of samples that all count `factor` times: first to sender values, then, by the transpose of push, to sender coefficients.
+    void gather(std::span<const GatherSample> samples, float factor) {
         constexpr std::size_t far = 16, near = 8;
         for (std::size_t k = 0; k < samples.size(); ++k) {
             // The rows lie scattered over memory: ask for them while others are added.
@@ -64,7 +92,7 @@ private:
                 rows_.prefetch_row(samples[k + near].row);
             const GatherSample& s = samples[k];
             if (s.row == no_index) continue;
-            const LinkVector weight(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
+            const LinkVector weight = factor * LinkVector(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
             for (const BasisEntry& entry : rows_.row(s.row))
                 link_.at(entry.index) += entry.value * weight;
         }
@@ -231,14 +259,14 @@ Links join(std::vector<std::vector<PackedLink>> rows) {
     return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
 }
 
-/// Of a receiver of a level.
+/// Of a receiver of a level; see LinkOptions.
 int gather_rays(const LinkOptions& options, const PointHierarchy& points, int level) {
-    const float coarser = std::log2(points.spacing[level] / points.spacing.back());
-    const int doublings = static_cast<int>(1.5f * std::max(0.0f, coarser) + 0.01f);
-    int rays = options.rays;
-    for (int k = 0; k < doublings && rays < options.most_rays; ++k)
-        rays *= 2;
-    return rays;
+    const double ratio = std::max(1.0f, points.spacing[level] / points.spacing.back());
+    const double least = options.rays * ratio;
+    const double wanted = std::clamp(options.rays * std::pow(ratio, 1.5), least,
+                                     std::max(least, LinkOptions().rays * ratio));
+    const auto most = static_cast<double>(std::max(options.rays, options.most_rays));
+    return 1 << static_cast<int>(std::log2(std::min(wanted, most)) + 0.01);
 }
 
 /// Rays of all receivers.
@@ -277,6 +305,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     statistics.threshold = link_threshold(options, points);
     const auto all_rays = static_cast<double>(rays_of_all(options, points));
+    double rays_begun = 0.0; // those that were not needed included
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
@@ -287,40 +316,68 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
                              noisy ? least_share_of_a_ray * of_one_ray : 0.0f);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
-        const Index batch = std::max<Index>(grain, samples_at_once / directions.rays());
-        std::vector<std::uint64_t> links_before(
-            static_cast<std::size_t>((batch + grain - 1) / grain));
+        const int count = directions.rays();
+        const int first_count = thresholds.has_children ? count : count / first_rays_divisor;
+        const Index batch = std::max<Index>(grain, samples_at_once / count);
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
-            auto start = Clock::now();
-            trace_gather(surface, rows, points, begin, end, points.begin(l), directions, footprint,
-                         samples);
-            statistics.trace_seconds += seconds_since(start);
-            statistics.rays += samples.size();
-
-            start = Clock::now();
-            needed.clear();
-            for (const GatherSample& s : samples)
-                needed.push_back(s.row);
-            rows.require(needed);
-            statistics.rows_seconds += seconds_since(start);
-
-            start = Clock::now();
-            std::fill(links_before.begin(), links_before.end(), 0);
-            parallel_ranges(end - begin, grain, [&](Index first, Index last) {
-                const auto maker = makers.borrow();
-                for (Index r = first; r < last; ++r)
-                    maker->make(
-                        begin + r, l,
-                        std::span(samples).subspan(static_cast<std::size_t>(r) * directions.rays(),
-                                                   static_cast<std::size_t>(directions.rays())),
-                        parents, thresholds, done[begin + r], pushed[begin + r - points.begin(l)],
-                        links_before[static_cast<std::size_t>(first / grain)]);
+            std::vector<std::uint32_t> receivers(static_cast<std::size_t>(end - begin));
+            std::iota(receivers.begin(), receivers.end(), static_cast<std::uint32_t>(begin));
+            samples.resize(receivers.size() * static_cast<std::size_t>(count));
+            const auto samples_of = [&](Index r, RayRange range) {
+                return std::span(samples).subspan(static_cast<std::size_t>(r * count + range.first),
+                                                  static_cast<std::size_t>(range.count));
+            };
+            const auto trace = [&](RayRange range) {
+                auto start = Clock::now();
+                trace_gather(surface, rows, points, receivers, points.begin(l), directions, range,
+                             footprint, samples);
+                statistics.trace_seconds += seconds_since(start);
+                statistics.rays += receivers.size() * static_cast<std::size_t>(range.count);
+                start = Clock::now();
+                needed.clear();
+                for (Index r = 0; r < static_cast<Index>(receivers.size()); ++r)
+                    for (const GatherSample& s : samples_of(r, range))
+                        needed.push_back(s.row);
+                rows.require(needed);
+                statistics.rows_seconds += seconds_since(start);
+            };
+            const auto for_each_receiver = [&](const auto& body) {
+                const auto start = Clock::now();
+                parallel_ranges(static_cast<Index>(receivers.size()), grain, [&](Index first, Index last) {
+                    const auto maker = makers.borrow();
+                    for (Index r = first; r < last; ++r) body(*maker, r);
+                });
+                statistics.links_seconds += seconds_since(start);
+            };
+            trace({0, first_count});
+            if (first_count < count) {
+                std::vector<char> wanted(receivers.size());
+                for_each_receiver([&](RowMaker& maker, Index r) {
+                    wanted[r] = maker.expects_links(receivers[r], l, samples_of(r, {0, first_count}),
+                                                    static_cast<float>(first_count) / static_cast<float>(count),
+                                                    parents, thresholds);
+                });
+                std::size_t kept = 0;
+                for (std::size_t r = 0; r < receivers.size(); ++r) {
+                    if (!wanted[r]) continue;
+                    std::copy_n(samples_of(static_cast<Index>(r), {0, first_count}).begin(), first_count,
+                                samples_of(static_cast<Index>(kept), {0, first_count}).begin());
+                    receivers[kept++] = receivers[r];
+                }
+                receivers.resize(kept);
+                trace({first_count, count - first_count});
+            }
+            std::vector<std::uint64_t> links_before(receivers.size());
+            for_each_receiver([&](RowMaker& maker, Index r) {
+                const Index i = receivers[r];
+                maker.make(i, l, samples_of(r, {0, count}), parents, thresholds, done[i],
+                           pushed[i - points.begin(l)], links_before[r]);
             });
-            for (const std::uint64_t count : links_before)
-                statistics.links_before += count;
-            statistics.links_seconds += seconds_since(start);
-            if (options.progress) options.progress(static_cast<double>(statistics.rays) / all_rays);
+            for (const std::uint64_t of_receiver : links_before)
+                statistics.links_before += of_receiver;
+            rays_begun += static_cast<double>(samples.size());
+            if (options.progress) options.progress(rays_begun / all_rays);
         }
     }
     statistics.patches = rows.made();

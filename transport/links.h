@@ -12,9 +12,12 @@
 namespace afterglow {
 
 struct LinkOptions {
-    int rays = 512; // of a receiver on the finest level; a power of two
-    /// Coarser levels l have more, (R_l / R_L)^1.5 times as many rounded down to a power of two, until
-    /// there are these: their links must be less noisy as their thresholds are lower.
+    /// Of a receiver on the display level; a power of two. A quarter will do where that shows no link
+    /// that would be kept.
+    int rays = 512;
+    /// Coarser levels l have more, R_l / R_L times as many, as their links must be less noisy where their
+    /// thresholds are lower; of few rays (R_l / R_L)^1.5 times as many until there are 512 R_l / R_L.
+    /// Rounded down to a power of two, and never more than these.
     int most_rays = 8192;
     float footprint_angle = 0.02f; // see Footprint
     /// A link d of a receiver on level l to a sender on level k is kept where

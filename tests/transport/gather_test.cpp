@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <utility>
 #include <vector>
@@ -28,6 +30,17 @@ PointHierarchy receivers_at(const std::vector<SurfacePoint>& places) {
     points.level_begin = {0, static_cast<std::uint32_t>(places.size())};
     points.spacing = {1.0f};
     return points;
+}
+
+/// All rays of the points [begin, end) of a level that begins with 0.
+std::vector<GatherSample> gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
+                                 std::uint32_t begin, std::uint32_t end, const GatherDirections& directions,
+                                 const Footprint& footprint = {}) {
+    std::vector<std::uint32_t> receivers(end - begin);
+    std::iota(receivers.begin(), receivers.end(), begin);
+    std::vector<GatherSample> samples(receivers.size() * static_cast<std::size_t>(directions.rays()));
+    trace_gather(surface, rows, points, receivers, 0, directions, {0, directions.rays()}, footprint, samples);
+    return samples;
 }
 
 TEST(GatherDirections, HaveTheDensityOfTheirWeights) {
@@ -113,6 +126,30 @@ TEST(GatherDirections, StratifyEachReceiverAndItsNeighbours) {
     }
 }
 
+/// A part of a receiver's rays is a part of the same directions, and well spread itself.
+TEST(GatherDirections, ComeInParts) {
+    const GatherDirections directions(256, 9);
+    for (const Index receiver : {0, 1, 1000}) {
+        Eigen::Matrix3Xf all, first(3, 64), others(3, 192);
+        directions.deal(receiver, all);
+        directions.deal(receiver, 0, first);
+        directions.deal(receiver, 64, others);
+        std::set<std::array<float, 3>> wanted, found;
+        for (Index k = 0; k < 256; ++k) wanted.insert({all(0, k), all(1, k), all(2, k)});
+        for (const Eigen::Matrix3Xf* part : {&first, &others})
+            for (Index k = 0; k < part->cols(); ++k)
+                found.insert({(*part)(0, k), (*part)(1, k), (*part)(2, k)});
+        EXPECT_EQ(found, wanted);
+        // Sixteen sectors of azimuth, four of the 64 each.
+        std::array<int, 16> sector{};
+        for (Index k = 0; k < 64; ++k) {
+            const double turn = std::atan2(first(1, k), first(0, k)) / (2.0 * pi) + 1.0;
+            ++sector[static_cast<std::size_t>(16.0 * (turn - std::floor(turn))) % 16];
+        }
+        for (const int count : sector) EXPECT_EQ(count, 4);
+    }
+}
+
 TEST(GatherDirections, DifferBetweenReceiversAndSeeds) {
     Eigen::Matrix3Xf a, b, c;
     const GatherDirections directions(64, 1);
@@ -153,8 +190,8 @@ TEST(TraceGather, TurnsUniformRadiosityIntoTheNormal) {
     const std::vector<SurfacePoint> places = points_by_area(scene, 256, 3);
     constexpr int rays = 256;
     const GatherDirections directions(rays, 7);
-    std::vector<GatherSample> samples;
-    trace_gather(surface, senders.rows, receivers_at(places), 0, 256, 0, directions, {}, samples);
+    const std::vector<GatherSample> samples =
+        gather(surface, senders.rows, receivers_at(places), 0, 256, directions);
     ASSERT_EQ(samples.size(), 256u * rays);
     Eigen::Vector3d total_error = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < places.size(); ++i) {
@@ -184,10 +221,10 @@ TEST(TraceGather, NamesTheRowsOfWhatItMeetsAtTheLevelOfItsFootprint) {
     const GatherDirections directions(64, 7);
     const PointHierarchy points = receivers_at(places);
     // In two parts, as batches are traced.
-    std::vector<GatherSample> samples, part;
-    for (const Index begin : {0, 24}) {
-        trace_gather(surface, senders.rows, points, begin, begin == 0 ? 24 : 64, 0, directions,
-                     footprint, part);
+    std::vector<GatherSample> samples;
+    for (const std::uint32_t begin : {0u, 24u}) {
+        const auto part =
+            gather(surface, senders.rows, points, begin, begin == 0 ? 24 : 64, directions, footprint);
         samples.insert(samples.end(), part.begin(), part.end());
     }
     int finest = 0, between = 0;
@@ -247,9 +284,8 @@ TEST(TraceGather, MarksRaysThatLeaveTheScene) {
     const Surface surface(scene);
     Senders senders(surface, Vec3(0.3f, 0.3f, 0.0f), 0.3f, 1);
     const GatherDirections directions(64, 7);
-    std::vector<GatherSample> samples;
     const SurfacePoint x{Vec3(0.5f, 0.0f, 0.0f), Vec3::UnitY()};
-    trace_gather(surface, senders.rows, receivers_at({x}), 0, 1, 0, directions, {}, samples);
+    const std::vector<GatherSample> samples = gather(surface, senders.rows, receivers_at({x}), 0, 1, directions);
     for (const GatherSample& s : samples) {
         // The wall x = 0 is one high and reaches from z = -1 to 1.
         const Vec3 at_wall = x.position + 0.5f / -s.weight.x() * s.weight;
