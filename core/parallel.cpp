@@ -3,6 +3,7 @@
 #include <immintrin.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -34,5 +35,7 @@ void parallel_ranges(Index count, Index grain, const std::function<void(Index, I
         },
         tbb::simple_partitioner());
 }
+
+void parallel_sort(std::span<std::uint64_t> keys) { tbb::parallel_sort(keys.begin(), keys.end()); }
 
 } // namespace afterglow

@@ -3,9 +3,11 @@
 #include "core/types.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -54,6 +56,9 @@ T parallel_sum(Index count, T zero, const Term& term, Index grain = 256) {
     for (const T& p : partial) total += p;
     return total;
 }
+
+/// Sorts in parallel. Equal keys look the same, so the result does not depend on the number of threads.
+void parallel_sort(std::span<std::uint64_t> keys);
 
 /// Scratch objects that are costly to make: each body of a parallel loop borrows one, and there are
 /// as many as bodies that ran at the same time. They come back as they were left.

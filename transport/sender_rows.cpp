@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <utility>
 
 namespace afterglow {
@@ -72,20 +73,21 @@ std::uint32_t SenderRows::side_of(const Hit& hit, std::uint32_t first) const {
 void SenderRows::see(std::span<const Hit> arrivals) {
     const auto count = static_cast<Index>(arrivals.size());
     std::vector<std::uint8_t> is_hidden(arrivals.size());
-    std::vector<std::uint32_t> order(arrivals.size()); // by patch
+    std::vector<Vec3> place(arrivals.size()); // lifted off the surface
+    parallel_for(count, [&](Index k) { place[k] = surface_.lifted(surface_.point(arrivals[k])); }, 1024);
+    std::vector<std::uint64_t> order(arrivals.size()); // patch in the upper half, arrival in the lower
+    const auto patch_of = [&](std::size_t n) { return static_cast<std::uint32_t>(order[n] >> 32); };
+    const auto arrival_of = [](std::uint64_t key) { return static_cast<std::uint32_t>(key); };
     for (int l = 0; l < levels(); ++l) {
         const PatchGrid& grid = grid_[l];
-        std::vector<std::uint32_t> patch_of(arrivals.size());
-        for (Index k = 0; k < count; ++k) {
-            patch_of[k] = grid.patch_of(arrivals[k]);
-            order[k] = static_cast<std::uint32_t>(k);
-        }
-        std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-            return patch_of[a] != patch_of[b] ? patch_of[a] < patch_of[b] : a < b;
-        });
-        std::vector<std::span<const std::uint32_t>> groups; // arrivals of one patch each
+        parallel_for(count, [&](Index k) {
+            order[k] = static_cast<std::uint64_t>(grid.patch_of(arrivals[k])) << 32
+                       | static_cast<std::uint64_t>(k);
+        }, 1024);
+        parallel_sort(order);
+        std::vector<std::span<const std::uint64_t>> groups; // arrivals of one patch each
         for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
-            while (end < order.size() && patch_of[order[end]] == patch_of[order[begin]]) ++end;
+            while (end < order.size() && patch_of(end) == patch_of(begin)) ++end;
             groups.push_back(std::span(order).subspan(begin, end - begin));
         }
         struct Sides {
@@ -93,19 +95,21 @@ void SenderRows::see(std::span<const Hit> arrivals) {
         };
         std::vector<Sides> sides(groups.size());
         parallel_for(static_cast<Index>(groups.size()), [&](Index g) {
-            const std::uint32_t patch = patch_of[groups[g].front()];
+            const auto patch = static_cast<std::uint32_t>(groups[g].front() >> 32);
             Hit centre = grid.center(patch);
             const auto look_from = [&](const Hit& from) {
                 centre = from;
+                const Vec3 eye = surface_.lifted(surface_.point(centre));
                 std::uint32_t seen = 0;
-                for (const std::uint32_t k : groups[g])
-                    seen += !(is_hidden[k] = hidden(arrivals[k], centre));
+                for (const std::uint64_t key : groups[g])
+                    seen += !(is_hidden[arrival_of(key)] = surface_.blocked(place[arrival_of(key)], eye));
                 return seen;
             };
-            if (look_from(centre) == 0) look_from(sides[g].first = arrivals[groups[g].front()]);
-            for (const std::uint32_t k : groups[g])
-                if (is_hidden[k]) {
-                    sides[g].second = arrivals[k];
+            if (look_from(centre) == 0)
+                look_from(sides[g].first = arrivals[arrival_of(groups[g].front())]);
+            for (const std::uint64_t key : groups[g])
+                if (is_hidden[arrival_of(key)]) {
+                    sides[g].second = arrivals[arrival_of(key)];
                     return;
                 }
             // Light may come to a corner though none was counted.
@@ -120,7 +124,7 @@ void SenderRows::see(std::span<const Hit> arrivals) {
             }
         });
         for (std::size_t g = 0; g < groups.size(); ++g) {
-            const std::uint32_t first = first_[l] + patch_of[groups[g].front()];
+            const std::uint32_t first = first_[l] + static_cast<std::uint32_t>(groups[g].front() >> 32);
             if (sides[g].first) centre_[first] = sides[g].first;
             if (!sides[g].second) continue;
             const auto second = static_cast<std::uint32_t>(place_.size());
@@ -197,20 +201,24 @@ PullOperator SenderRows::make_pull_operator() {
     std::vector<std::vector<BasisEntry>> rows(points.end(levels() - 1));
     for (int l = 0; l + 1 < levels(); ++l) {
         // Turned around: the patches in which each function of the level is seen.
-        std::vector<std::vector<std::pair<std::uint32_t, float>>> sees(points.end(l)
-                                                                       - points.begin(l));
+        std::vector<std::uint32_t> begin(points.end(l) - points.begin(l) + 2, 0);
+        for (const std::uint32_t patch_row : seen[l])
+            for (const BasisEntry& entry : row(patch_row))
+                if (entry.index >= points.begin(l)) ++begin[entry.index - points.begin(l) + 2];
+        std::partial_sum(begin.begin(), begin.end(), begin.begin());
+        std::vector<std::pair<std::uint32_t, float>> sees(begin.back());
         for (std::uint32_t p = 0; p < patches.size(); ++p)
             for (const BasisEntry& entry : row(seen[l][p]))
                 if (entry.index >= points.begin(l))
-                    sees[entry.index - points.begin(l)].push_back(
-                        {p, static_cast<float>(hits(patches[p])) * entry.value});
+                    sees[begin[entry.index - points.begin(l) + 1]++] =
+                        {p, static_cast<float>(hits(patches[p])) * entry.value};
         ScratchPool<Accumulator<double>> sums(
             [&] { return std::make_unique<Accumulator<double>>(points.end(l + 1), 0.0); });
-        parallel_ranges(static_cast<Index>(sees.size()), 64, [&](Index first, Index last) {
+        parallel_ranges(points.end(l) - points.begin(l), 64, [&](Index first, Index last) {
             const auto sum = sums.borrow();
             for (Index k = first; k < last; ++k) {
                 double total = 0.0, kept = 0.0;
-                for (const auto& [p, weight] : sees[k])
+                for (const auto& [p, weight] : std::span(sees).subspan(begin[k], begin[k + 1] - begin[k]))
                     for (const BasisEntry& child : row(seen[l + 1][p]))
                         if (child.index >= points.begin(l + 1)) {
                             const double share = static_cast<double>(weight) * child.value;
