@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <unordered_map>
+#include <vector>
 
 namespace afterglow {
 namespace {
@@ -26,10 +26,45 @@ struct Cell {
 };
 
 using CellKey = std::array<std::int32_t, 3>;
-struct CellHash {
-    std::size_t operator()(const CellKey& k) const {
-        return hash64(hash64(static_cast<std::uint32_t>(k[0]), static_cast<std::uint32_t>(k[1])),
+
+/// From the place of a cell to its number: open addressing, one cache line a look.
+class CellIndex {
+public:
+    /// -1 where there is none.
+    std::int32_t find(const CellKey& key) const {
+        for (std::size_t k = hash(key);; ++k) {
+            const Slot& slot = slots_[k & (slots_.size() - 1)];
+            if (slot.id < 0 || slot.key == key) return slot.id;
+        }
+    }
+    /// The key must be new.
+    void insert(const CellKey& key, std::int32_t id) {
+        if (2 * ++used_ > slots_.size()) {
+            std::vector<Slot> old(2 * slots_.size());
+            old.swap(slots_);
+            for (const Slot& slot : old)
+                if (slot.id >= 0) put(slot);
+        }
+        put({key, id});
+    }
+
+private:
+    struct Slot {
+        CellKey key{};
+        std::int32_t id = -1;
+    };
+    std::vector<Slot> slots_ = std::vector<Slot>(1024);
+    std::size_t used_ = 0;
+
+    static std::size_t hash(const CellKey& k) {
+        return hash64(static_cast<std::uint64_t>(static_cast<std::uint32_t>(k[0])) << 32
+                          | static_cast<std::uint32_t>(k[1]),
                       static_cast<std::uint32_t>(k[2]));
+    }
+    void put(const Slot& slot) {
+        std::size_t k = hash(slot.key);
+        while (slots_[k & (slots_.size() - 1)].id >= 0) ++k;
+        slots_[k & (slots_.size() - 1)] = slot;
     }
 };
 
@@ -50,8 +85,8 @@ public:
         std::vector<char> fits_so_far(count);
         parallel_for(static_cast<Index>(count), [&](Index i) {
             const SurfacePoint& x = source[begin + i].at;
-            const auto cell = index_.find(key_of(x.position));
-            fits_so_far[i] = cell == index_.end() || fits(cells_[cell->second], x, refining, features_[i]);
+            const std::int32_t cell = index_.find(key_of(x.position));
+            fits_so_far[i] = cell < 0 || fits(cells_[cell], x, refining, features_[i]);
         });
         std::array<std::vector<std::int32_t>, 8> classes;
         for (std::size_t i = 0; i < count; ++i) {
@@ -109,7 +144,9 @@ private:
     /// Calls visit(dart, D) for the darts with D < R until it returns false.
     template <class Visit>
     void for_each_near(const Cell& cell, const SurfacePoint& x, const Visit& visit) const {
-        for (const std::int32_t id : cell.neighbour) {
+        constexpr std::size_t itself = 13; // most likely to hold a conflict
+        for (std::size_t k = 0; k < cell.neighbour.size(); ++k) {
+            const std::int32_t id = cell.neighbour[k == 0 ? itself : k <= itself ? k - 1 : k];
             if (id < 0) continue;
             for (const Dart& dart : cells_[id].darts) {
                 const Vec3 offset = x.position - dart.at.position;
@@ -173,15 +210,16 @@ private:
 
     std::int32_t cell_of(const Vec3& x) {
         const CellKey key = key_of(x);
-        if (const auto found = index_.find(key); found != index_.end()) return found->second;
+        if (const std::int32_t found = index_.find(key); found >= 0) return found;
         const auto id = static_cast<std::int32_t>(cells_.size());
         Cell& cell = cells_.emplace_back();
         cell.parity = (key[0] & 1) | (key[1] & 1) << 1 | (key[2] & 1) << 2;
-        index_.emplace(key, id);
+        index_.insert(key, id);
         for (int k = 0; k < 27; ++k) {
-            const auto near = index_.find({key[0] + k % 3 - 1, key[1] + k / 3 % 3 - 1, key[2] + k / 9 - 1});
-            cell.neighbour[k] = near == index_.end() ? -1 : near->second;
-            if (near != index_.end()) cells_[near->second].neighbour[26 - k] = id;
+            const std::int32_t near =
+                index_.find({key[0] + k % 3 - 1, key[1] + k / 3 % 3 - 1, key[2] + k / 9 - 1});
+            cell.neighbour[k] = near;
+            if (near >= 0) cells_[near].neighbour[26 - k] = id;
         }
         return id;
     }
@@ -191,7 +229,7 @@ private:
     OpennessProbe probe_;
     std::vector<std::optional<Openness>> features_; // of this round's candidates
     std::vector<Cell> cells_;
-    std::unordered_map<CellKey, std::int32_t, CellHash> index_;
+    CellIndex index_;
 };
 
 } // namespace
