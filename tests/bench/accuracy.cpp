@@ -90,7 +90,6 @@ void run_references(const Common& common) {
 struct MeasureOptions {
     PrecomputeOptions precompute;
     std::string json;
-    bool time_rays = false;
 };
 
 void add_measure_options(CLI::App& command, MeasureOptions& options) {
@@ -109,8 +108,6 @@ void add_measure_options(CLI::App& command, MeasureOptions& options) {
     command.add_option("--openness-density", p.openness_density);
     command.add_option("--sender-density", p.sender_density);
     command.add_option("--seed", p.seed);
-    command.add_flag("--time-rays", options.time_rays,
-                     "Trace the gather rays once more, with nothing else, for the ray ratio");
     command.add_option("--json", options.json, "File for all figures");
 }
 
@@ -127,44 +124,6 @@ Eigen::Array3Xf displayed_irradiance(const Surface& surface, const TransferOpera
             display.irradiance(points, transport.indirect(light), light, &uncovered);
     }
     return irradiance;
-}
-
-/// Seconds to trace the rays of all links once more with nothing else around.
-double gather_rays_alone(const Surface& surface, const PointHierarchy& points,
-                         const LinkOptions& options) {
-    double seconds = 0.0;
-    for (int l = 0; l < points.levels(); ++l) {
-        if (!points.leads_to_display(l)) continue;
-        const GatherDirections directions = gather_directions(options, points, l);
-        const int rays = directions.rays();
-        constexpr Index at_once = 256; // points whose rays are made before the clock runs
-        std::vector<Ray> ray(static_cast<std::size_t>(at_once) * rays);
-        std::vector<Hit> hit(ray.size());
-        for (Index begin = points.begin(l); begin < points.end(l); begin += at_once) {
-            const Index count = std::min<Index>(at_once, points.end(l) - begin);
-            parallel_ranges(count, 16, [&](Index first, Index last) {
-                Eigen::Matrix3Xf local;
-                for (Index r = first; r < last; ++r) {
-                    const SurfacePoint x = points.point(begin + r);
-                    const Frame frame(x.normal);
-                    directions.deal(begin + r - points.begin(l), local);
-                    for (int k = 0; k < rays; ++k)
-                        ray[static_cast<std::size_t>(r) * rays + k] = {
-                            surface.lifted(x), frame.to_world(local.col(k))};
-                }
-            });
-            const auto start = std::chrono::steady_clock::now();
-            parallel_ranges(count, 16, [&](Index first, Index last) {
-                const auto from = static_cast<std::size_t>(first) * rays;
-                const auto number = static_cast<std::size_t>(last - first) * rays;
-                surface.closest_hits(std::span(ray).subspan(from, number),
-                                     std::span(hit).subspan(from, number));
-            });
-            seconds +=
-                std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        }
-    }
-    return seconds;
 }
 
 void run_measure(const Common& common, const MeasureOptions& options) {
@@ -231,14 +190,6 @@ void run_measure(const Common& common, const MeasureOptions& options) {
         Json entry = {
             {"scene", name},    {"points", reference.points.size()}, {"uncovered", uncovered},
             {"lights", lights}, {"seconds", report.total_seconds},   {"bytes", bytes}};
-        if (options.time_rays && transfer.kind == OperatorKind::neumann) {
-            const double alone =
-                gather_rays_alone(surface, transfer.points, options.precompute.links);
-            std::printf("%s: the same gather rays alone %.1f s, ray ratio %.2f\n", name.c_str(),
-                        alone, report.total_seconds / alone);
-            entry["rays_alone_seconds"] = alone;
-            entry["ray_ratio"] = report.total_seconds / alone;
-        }
         all.push_back(entry);
         std::fflush(stdout);
     }
