@@ -335,10 +335,16 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
                 statistics.trace_seconds += seconds_since(start);
                 statistics.rays += receivers.size() * static_cast<std::size_t>(range.count);
                 start = Clock::now();
+                // Those of a range of receivers at a time, in order.
+                std::vector<std::vector<std::uint32_t>> missing(receivers.size() / grain + 1);
+                parallel_ranges(static_cast<Index>(receivers.size()), grain, [&](Index first, Index last) {
+                    for (Index r = first; r < last; ++r)
+                        for (const GatherSample& s : samples_of(r, range))
+                            if (s.row != no_index && !rows.is_made(s.row))
+                                missing[static_cast<std::size_t>(first / grain)].push_back(s.row);
+                });
                 needed.clear();
-                for (Index r = 0; r < static_cast<Index>(receivers.size()); ++r)
-                    for (const GatherSample& s : samples_of(r, range))
-                        needed.push_back(s.row);
+                for (const auto& of_range : missing) needed.insert(needed.end(), of_range.begin(), of_range.end());
                 rows.require(needed);
                 statistics.rows_seconds += seconds_since(start);
             };

@@ -37,6 +37,7 @@ public:
         const std::uint32_t n = first_[level] + grid_[level].patch_of(hit);
         return is_cut_[n] ? side_of(hit, n) : n;
     }
+    bool is_made(std::uint32_t number) const { return place_[number].count != not_made; }
     /// Makes these rows (repetitions allowed, no_index is passed over); not to be called concurrently.
     void require(std::span<const std::uint32_t> numbers);
     /// A row that was required; empty where no function sees the patch.
