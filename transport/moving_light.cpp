@@ -50,18 +50,54 @@ MovingLight::MovingLight(const LightTransport& transport, const Options& options
     field_.resize(9 * static_cast<std::size_t>(points.size()));
 }
 
-void MovingLight::push_field(int levels) {
+/// The product at a point, and what the level above predicts: x, y, z, of which R, G, B count.
+std::array<Eigen::Vector4f, 3> MovingLight::pushed(Index i) const {
+    std::array<Eigen::Vector4f, 3> sum;
+    std::copy_n(&product_[static_cast<std::size_t>(3 * i)], 3, sum.begin());
+    const SparseRows<float>& parents = transport_.transfer().push.parents;
+    const auto index = parents.indices(i);
+    const auto weight = parents.values(i);
+    for (std::size_t e = 0; e < index.size(); ++e)
+        for (std::size_t a = 0; a < 3; ++a) // parents are never the last point: no end is passed
+            sum[a] += weight[e] * Eigen::Vector4f::Map(&field_[9 * std::size_t{index[e]} + 3 * a]);
+    return sum;
+}
+
+void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
+    for (std::size_t a = 0; a < 3; ++a)
+        std::copy_n(value[a].data(), 3, &field_[9 * static_cast<std::size_t>(i) + 3 * a]);
+}
+
+void MovingLight::push_levels(int levels) {
     const PointHierarchy& points = transport_.transfer().points;
-    parallel_for(points.end(levels - 1), [&](Index i) {
-        for (int a = 0; a < 3; ++a)
-            std::copy_n(product_[static_cast<std::size_t>(3 * i + a)].data(), 3, &field_[static_cast<std::size_t>(9 * i + 3 * a)]);
-    }, 4096);
-    transport_.transfer().push.push(points, levels, 9, field_);
+    for (int l = 0; l < levels; ++l)
+        parallel_for(points.end(l) - points.begin(l), [&](Index k) {
+            const Index i = points.begin(l) + k;
+            store(i, pushed(i));
+        }, 1024);
+}
+
+/// All levels, the last in one pass with what is asked of it: its norm, and where it is negative.
+void MovingLight::push_display() {
+    const PointHierarchy& points = transport_.transfer().points;
+    push_levels(points.levels() - 1);
+    const Index first = points.begin(points.levels() - 1), count = static_cast<Index>(points.size()) - first;
+    is_negative_.resize(static_cast<std::size_t>(count));
+    field_norm_ = std::sqrt(parallel_sum(count, 0.0, [&](Index k) {
+        const Index i = first + k;
+        const std::array<Eigen::Vector4f, 3> v = pushed(i);
+        store(i, v);
+        const Vec3 n = points.normal.col(i);
+        const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
+        is_negative_[static_cast<std::size_t>(k)] = irradiance.head<3>().minCoeff() < 0.0f;
+        return static_cast<double>(v[0].head<3>().squaredNorm() + v[1].head<3>().squaredNorm()
+                                   + v[2].head<3>().squaredNorm());
+    }, 1024));
 }
 
 Radiosity MovingLight::radiosity(const Radiosity& direct) {
     const TransferOperator& transfer = transport_.transfer();
-    push_field(transfer.sender_levels);
+    push_levels(transfer.sender_levels);
     Radiosity sum(direct.size());
     parallel_for(transfer.senders(), [&](Index m) {
         const Vec3 n = transfer.points.normal.col(m);
@@ -78,17 +114,29 @@ Radiosity MovingLight::radiosity(const Radiosity& direct) {
 MovingLight::Changes MovingLight::changes(const std::vector<float>& coefficients) const {
     const double tau = waiting_share * options_.tolerance * field_norm_
                        / std::sqrt(static_cast<double>(columns_->links()));
-    Changes found;
-    for (std::uint32_t j = 0; j < norm_.size(); ++j) {
-        const Eigen::Vector4f change = Eigen::Vector4f::Map(&coefficients[4 * j]) - Eigen::Vector4f::Map(&applied_[4 * j]);
-        const double effect = change.norm() * norm_[j];
-        found.effect += effect * effect;
-        if (effect * effect <= tau * tau * columns_->links_of(j)) continue;
-        found.list.push_back({j, change});
-        found.links += columns_->links_of(j);
+    constexpr Index grain = 4096;
+    const auto senders = static_cast<Index>(norm_.size());
+    std::vector<Changes> parts(static_cast<std::size_t>((senders + grain - 1) / grain));
+    parallel_ranges(senders, grain, [&](Index begin, Index end) {
+        Changes& part = parts[static_cast<std::size_t>(begin / grain)];
+        for (auto j = static_cast<std::uint32_t>(begin); j < end; ++j) {
+            const Eigen::Vector4f change =
+                Eigen::Vector4f::Map(&coefficients[4 * j]) - Eigen::Vector4f::Map(&applied_[4 * j]);
+            const double effect2 = static_cast<double>(change.squaredNorm()) * norm_[j] * norm_[j];
+            part.effect += effect2;
+            if (effect2 <= tau * tau * columns_->links_of(j)) continue;
+            part.list.push_back({j, change});
+            part.links += columns_->links_of(j);
+        }
+    });
+    Changes all;
+    for (const Changes& part : parts) {
+        all.list.insert(all.list.end(), part.list.begin(), part.list.end());
+        all.links += part.links;
+        all.effect += part.effect;
     }
-    found.effect = std::sqrt(found.effect);
-    return found;
+    all.effect = std::sqrt(all.effect);
+    return all;
 }
 
 void MovingLight::start_anew(const Radiosity& direct) {
@@ -122,25 +170,23 @@ void MovingLight::follow_intensity(const Spotlight& light) {
 }
 
 void MovingLight::follow_brightness(const std::vector<float>& coefficients) {
-    Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
-    for (std::size_t j = 0; j < norm_.size(); ++j) {
+    struct Sums {
+        Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
+        Sums& operator+=(const Sums& other) {
+            both += other.both;
+            old += other.old;
+            return *this;
+        }
+    };
+    const auto [both, old] = parallel_sum(static_cast<Index>(norm_.size()), Sums{}, [&](Index k) {
+        const auto j = static_cast<std::size_t>(k);
         const Eigen::Array4d was = Eigen::Array4f::Map(&applied_[4 * j]).cast<double>() * norm_[j];
-        both += was * Eigen::Array4f::Map(&coefficients[4 * j]).cast<double>() * norm_[j];
-        old += was * was;
-    }
+        return Sums{was * Eigen::Array4f::Map(&coefficients[4 * j]).cast<double>() * norm_[j], was * was};
+    }, 4096);
     Rgb factor = Rgb::Ones();
     for (int c = 0; c < 3; ++c)
         if (old[c] > 0.0) factor[c] = static_cast<float>(both[c] / old[c]);
     if (((factor - 1.0f).abs() > static_cast<float>(options_.tolerance)).any()) scale(factor);
-}
-
-double MovingLight::display_norm() const {
-    const PointHierarchy& points = transport_.transfer().points;
-    const Index first = 9 * static_cast<Index>(points.begin(points.levels() - 1));
-    return std::sqrt(parallel_sum(9 * static_cast<Index>(points.size()) - first, 0.0, [&](Index k) {
-        const double v = field_[static_cast<std::size_t>(first + k)];
-        return v * v;
-    }, 16384));
 }
 
 void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
@@ -181,9 +227,8 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
         follow_round(direct, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
         const TransferOperator& transfer = transport_.transfer();
-        push_field(transfer.points.levels());
-        make_positive(transfer.points, transfer.push, field_);
-        field_norm_ = display_norm();
+        push_display();
+        make_positive(transfer.points, transfer.push, is_negative_, field_);
         // What was small beside the field as it was may not be beside a darker one.
         if (field_norm_ < 0.9 * norm_before) s.settled = s.anew;
         watch.add_to(s.push_seconds);

@@ -3,6 +3,8 @@
 #include "transport/link_columns.h"
 #include "transport/transfer_operator.h"
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -34,7 +36,7 @@ struct MovingLightStatistics {
 class MovingLight {
 public:
     struct Options {
-        double tolerance = 2e-3;
+        double tolerance = 4e-3;
         int most_rounds = 0; // a pose; 0: until it has settled
     };
 
@@ -54,6 +56,7 @@ private:
     std::vector<float> applied_;             // c as it was multiplied, four floats a sender
     std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each
     VectorIrradiance field_;
+    std::vector<std::uint8_t> is_negative_;  // a display point each: its irradiance, before make_positive()
     double field_norm_ = 0.0; // |field| at the display level
     std::optional<Spotlight> light_; // of the last pose
 
@@ -66,13 +69,15 @@ private:
     Changes changes(const std::vector<float>& coefficients) const;
     class Stopwatch;
     void follow_round(const Radiosity& direct, MovingLightStatistics& statistics, Stopwatch& watch);
-    double display_norm() const;
     void start_anew(const Radiosity& direct);
     /// Of a light that changes its intensity alone, all is known.
     void follow_intensity(const Spotlight& light);
     void follow_brightness(const std::vector<float>& coefficients);
     void scale(const Rgb& factor);
-    void push_field(int levels);
+    std::array<Eigen::Vector4f, 3> pushed(Index i) const;
+    void store(Index i, const std::array<Eigen::Vector4f, 3>& value);
+    void push_levels(int levels);
+    void push_display();
 };
 
 } // namespace afterglow

@@ -37,7 +37,15 @@ void make_positive(const PointHierarchy& points, const PushOperator& push, Vecto
     parallel_for(count, [&](Index k) {
         is_negative[static_cast<std::size_t>(k)] = (display.irradiance(first + k) < 0.0f).any();
     }, 4096);
+    make_positive(points, push, is_negative, field);
+}
+
+void make_positive(const PointHierarchy& points, const PushOperator& push, std::span<const std::uint8_t> is_negative,
+                   VectorIrradiance& field) {
     if (std::find(is_negative.begin(), is_negative.end(), 1) == is_negative.end()) return;
+    const int last = points.levels() - 1;
+    const Index first = points.begin(last), count = points.end(last) - first;
+    DisplayPoints display{points, field};
 
     // What is missing below each parent, and what there is to take it from.
     const Index parents = first;
@@ -54,7 +62,7 @@ void make_positive(const PointHierarchy& points, const PushOperator& push, Vecto
         }
     }
     // Whose irradiance changes: found in parallel, added up in order.
-    std::vector<std::uint8_t> changes(is_negative);
+    std::vector<std::uint8_t> changes(is_negative.begin(), is_negative.end());
     parallel_for(count, [&](Index k) {
         const auto index = push.parents.indices(first + k);
         changes[static_cast<std::size_t>(k)] |= std::any_of(

@@ -4,6 +4,9 @@
 #include "basis/push.h"
 #include "transport/transfer_operator.h"
 
+#include <cstdint>
+#include <span>
+
 namespace afterglow {
 
 /// Irradiance below zero at points of the display level, which dropped links leave beside hard shadows and
@@ -18,5 +21,10 @@ namespace afterglow {
 /// n_j alone. `field`: nine numbers a point, as VectorIrradiance, in place. Costs next to nothing where
 /// nothing is negative.
 void make_positive(const PointHierarchy& points, const PushOperator& push, VectorIrradiance& field);
+
+/// The same where it is known already at which points of the display level, in their order, it is below
+/// zero.
+void make_positive(const PointHierarchy& points, const PushOperator& push, std::span<const std::uint8_t> is_negative,
+                   VectorIrradiance& field);
 
 } // namespace afterglow

@@ -45,7 +45,7 @@ std::vector<float> LightTransport::coefficients(const Radiosity& radiosity) cons
     transfer_.push.difference(points, transfer_.sender_levels, 3, values);
     transfer_.pull.update(points, transfer_.sender_levels, 3, values);
     std::vector<float> padded(4 * static_cast<std::size_t>(transfer_.senders()), 0.0f);
-    for (std::size_t m = 0; m < transfer_.senders(); ++m) std::copy_n(&values[3 * m], 3, &padded[4 * m]);
+    parallel_for(transfer_.senders(), [&](Index m) { std::copy_n(&values[3 * m], 3, &padded[4 * m]); }, 4096);
     return padded;
 }
 
