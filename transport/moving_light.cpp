@@ -143,7 +143,7 @@ void MovingLight::start_anew(const Radiosity& direct) {
     applied_ = transport_.coefficients(transport_.all_bounces(direct));
     std::vector<LinkColumns::Change> all;
     for (std::uint32_t j = 0; j < norm_.size(); ++j)
-        all.push_back({j, Eigen::Vector4f::Map(&applied_[4 * j])});
+        if (const auto c = Eigen::Vector4f::Map(&applied_[4 * j]); !c.isZero(0.0f)) all.push_back({j, c});
     std::fill(product_.begin(), product_.end(), Eigen::Vector4f::Zero());
     columns_->add_product(all, product_);
 }
@@ -190,6 +190,13 @@ void MovingLight::follow_brightness(const std::vector<float>& coefficients) {
 }
 
 void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
+    if (field_norm_ == 0.0) { // out of the dark there is nothing to follow
+        start_anew(direct);
+        s.links_share += 1.0;
+        s.settled = s.anew = true;
+        watch.add_to(s.links_seconds);
+        return;
+    }
     const std::vector<float> coefficients = transport_.coefficients(radiosity(direct));
     follow_brightness(coefficients);
     const Changes changed = changes(coefficients);

@@ -48,7 +48,7 @@ Spotlight first_light(const Camera& camera, float scene_size) {
 
 Session::Session(const Gl& gl, const std::string& file, const std::string& scene_override,
                  IndirectMethod method)
-    : path(file), scene(file, scene_override), solver(scene, 2), renderer(gl, scene, method),
+    : path(file), scene(file, scene_override), solver(scene, 1), renderer(gl, scene, method),
       overlays(scene), camera(first_camera(scene)),
       scene_size(scene.scene.bounds().sizes().norm()), light_thread([this](const Spotlight& pose) {
           const auto field = solver.solve(pose);
