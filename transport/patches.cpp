@@ -1,41 +1,150 @@
 #include "transport/patches.h"
 
 #include "core/error.h"
+#include "core/parallel.h"
+#include "core/sampling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
+#include <utility>
 
 namespace afterglow {
+
+namespace {
+
+/// Centroid and normal of a triangle of no given length; nothing where it has no area.
+struct Lie {
+    Vec3 centroid, normal;
+};
+Lie lie_of(const Scene& scene, std::uint32_t triangle) {
+    const Triangle& t = scene.triangles[triangle];
+    const Vec3 &a = scene.positions[t[0]], &b = scene.positions[t[1]], &c = scene.positions[t[2]];
+    return {(a + b + c) / 3.0f, (b - a).cross(c - a).stableNormalized()};
+}
+
+/// Small triangles of one key are alike enough to share a cell.
+struct Likeness {
+    std::array<std::int32_t, 3> cube, normal;
+    std::uint32_t material;
+    bool operator==(const Likeness&) const = default;
+};
+Likeness likeness_of(const Scene& scene, std::uint32_t triangle, const Vec3& origin, float size) {
+    constexpr float cube_share = 0.75f, normal_steps = 3.0f;
+    const Lie lie = lie_of(scene, triangle);
+    Likeness key{{}, {}, scene.material_index[triangle]};
+    for (int a = 0; a < 3; ++a) {
+        key.cube[a] = static_cast<std::int32_t>(std::floor((lie.centroid[a] - origin[a]) / (cube_share * size)));
+        key.normal[a] = static_cast<std::int32_t>(std::lround(normal_steps * lie.normal[a]));
+    }
+    return key;
+}
+std::uint64_t hash_of(const Likeness& key) {
+    std::uint64_t h = key.material;
+    for (int a = 0; a < 3; ++a) {
+        h = hash64(h, static_cast<std::uint32_t>(key.cube[a]));
+        h = hash64(h, static_cast<std::uint32_t>(key.normal[a]));
+    }
+    return h;
+}
+
+} // namespace
 
 PatchGrid::PatchGrid(const Scene& scene, float size)
     : scene_(scene), cells_(scene.triangles.size()) {
     constexpr float most_along = 1024.0f;
     std::uint64_t cells = 0;
-    for (std::size_t t = 0; t < cells_.size(); ++t) {
+    std::vector<std::uint32_t> small;
+    for (std::uint32_t t = 0; t < cells_.size(); ++t) {
         const Triangle& corner = scene.triangles[t];
         const Vec3& a = scene.positions[corner[0]];
-        const auto along = [&](const Vec3& b) {
-            return static_cast<std::uint16_t>(
-                std::clamp(std::ceil((b - a).norm() / size), 1.0f, most_along));
+        const Vec3 ab = scene.positions[corner[1]] - a, ac = scene.positions[corner[2]] - a;
+        const float longest2 = std::max({ab.squaredNorm(), ac.squaredNorm(), (ac - ab).squaredNorm()});
+        if (longest2 <= 0.25f * size * size) {
+            small.push_back(t);
+            continue;
+        }
+        const auto along = [&](const Vec3& edge) {
+            return static_cast<std::uint16_t>(std::clamp(std::ceil(edge.norm() / size), 1.0f, most_along));
         };
-        cells_[t] = {static_cast<std::uint32_t>(cells), along(scene.positions[corner[1]]),
-                     along(scene.positions[corner[2]])};
+        cells_[t] = {static_cast<std::uint32_t>(cells), along(ab), along(ac)};
+        large_.push_back(t);
         cells += static_cast<std::uint64_t>(cells_[t].along_u) * cells_[t].along_v;
-        if (cells > 0x7fffffffu / 2)
+        if (cells + scene.triangles.size() > 0x7fffffffu / 2)
             throw Error("the scene needs more than 10^9 surface patches of size "
                         + std::to_string(size) + "; choose a larger --coarse-radius");
     }
-    count_ = static_cast<std::uint32_t>(2 * cells);
+    first_shared_ = static_cast<std::uint32_t>(cells);
+    share_cells(small, size, first_shared_);
+    count_ = 2 * (first_shared_ + static_cast<std::uint32_t>(shared_.size()));
+}
+
+void PatchGrid::share_cells(const std::vector<std::uint32_t>& small, float size, std::uint32_t first) {
+    // By the upper half of their keys' hashes, then in their own order.
+    const Vec3 origin = scene_.bounds().min();
+    std::vector<std::uint64_t> order(small.size());
+    parallel_for(static_cast<Index>(small.size()), [&](Index k) {
+        const std::uint64_t hash = hash_of(likeness_of(scene_, small[static_cast<std::size_t>(k)], origin, size));
+        order[static_cast<std::size_t>(k)] = (hash & 0xffffffff00000000u) | small[static_cast<std::size_t>(k)];
+    }, 4096);
+    parallel_sort(order);
+    std::vector<std::uint32_t> members, first_member;
+    const auto finish = [&] {
+        if (members.empty()) return;
+        const auto cell = static_cast<std::uint32_t>(shared_.size());
+        double area = 0.0;
+        Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+        for (const std::uint32_t t : members) {
+            cells_[t] = {cell, 1, 1};
+            area += area_of(t);
+            middle += area_of(t) * lie_of(scene_, t).centroid.cast<double>();
+        }
+        middle /= std::max(area, 1e-300);
+        const auto distance2 = [&](std::uint32_t t) {
+            return (lie_of(scene_, t).centroid.cast<double>() - middle).squaredNorm();
+        };
+        const auto nearest = std::min_element(members.begin(), members.end(), [&](std::uint32_t a, std::uint32_t b) {
+            return distance2(a) < distance2(b);
+        });
+        shared_.push_back({*nearest, static_cast<float>(area)});
+        first_member.push_back(members.front());
+        members.clear();
+    };
+    Likeness last{};
+    for (const std::uint64_t key : order) {
+        const auto t = static_cast<std::uint32_t>(key);
+        const Likeness likeness = likeness_of(scene_, t, origin, size);
+        if (likeness != last) finish(); // two keys of one hash may take turns: more cells, none wrong
+        last = likeness;
+        members.push_back(t);
+    }
+    finish();
+
+    // Numbered as the mesh is, so that what is close in it is close in memory.
+    std::vector<std::uint64_t> by_member(shared_.size());
+    for (std::size_t k = 0; k < shared_.size(); ++k)
+        by_member[k] = static_cast<std::uint64_t>(first_member[k]) << 32 | k;
+    parallel_sort(by_member);
+    std::vector<std::uint32_t> number(shared_.size());
+    std::vector<Shared> sorted(shared_.size());
+    for (std::size_t k = 0; k < sorted.size(); ++k) {
+        const auto old = static_cast<std::uint32_t>(by_member[k]);
+        number[old] = first + static_cast<std::uint32_t>(k);
+        sorted[k] = shared_[old];
+    }
+    shared_ = std::move(sorted);
+    for (const std::uint32_t t : small) cells_[t].first = number[cells_[t].first];
 }
 
 PatchGrid::Location PatchGrid::locate(std::uint32_t patch) const {
     const std::uint32_t cell = patch / 2;
-    const auto next =
-        std::upper_bound(cells_.begin(), cells_.end(), cell,
-                         [](std::uint32_t c, const Cells& cells) { return c < cells.first; });
-    const Cells& c = *(next - 1);
-    return {static_cast<std::uint32_t>(next - 1 - cells_.begin()), (cell - c.first) % c.along_u,
-            (cell - c.first) / c.along_u};
+    if (cell >= first_shared_) return {shared_[cell - first_shared_].middle, 0, 0};
+    const auto next = std::upper_bound(large_.begin(), large_.end(), cell, [&](std::uint32_t c, std::uint32_t t) {
+        return c < cells_[t].first;
+    });
+    const Cells& c = cells_[*(next - 1)];
+    return {*(next - 1), (cell - c.first) % c.along_u, (cell - c.first) / c.along_u};
 }
 
 PatchGrid::Part PatchGrid::part(const Location& at) const {
@@ -90,13 +199,16 @@ std::array<Hit, 4> PatchGrid::corners(std::uint32_t patch) const {
     return corners;
 }
 
-float PatchGrid::area(std::uint32_t patch) const {
-    const Location at = locate(patch);
-    const Triangle& corner = scene_.triangles[at.triangle];
+float PatchGrid::area_of(std::uint32_t triangle) const {
+    const Triangle& corner = scene_.triangles[triangle];
     const Vec3& a = scene_.positions[corner[0]];
-    const float parallelogram =
-        (scene_.positions[corner[1]] - a).cross(scene_.positions[corner[2]] - a).norm();
-    return 0.5f * parallelogram * static_cast<float>(std::max(0.0, part(at).share));
+    return 0.5f * (scene_.positions[corner[1]] - a).cross(scene_.positions[corner[2]] - a).norm();
+}
+
+float PatchGrid::area(std::uint32_t patch) const {
+    if (patch / 2 >= first_shared_) return shared_[patch / 2 - first_shared_].area;
+    const Location at = locate(patch);
+    return area_of(at.triangle) * static_cast<float>(std::max(0.0, part(at).share));
 }
 
 } // namespace afterglow

@@ -14,7 +14,11 @@
 namespace afterglow {
 
 /// Cuts every triangle into parallelogram cells no longer than a given size, so that the cell of a
-/// hit is a few operations away. Both sides of a cell have ids of their own: 2 * cell + back side.
+/// hit is a few operations away. Triangles with no edge longer than half the size share a cell with
+/// others like them: those whose centroids lie in one cube three quarters of the size long, whose normals
+/// are within some 20 degrees and whose material is the same; so that cells become no more than the
+/// surface needs, however fine its triangles. Both sides of a cell have ids of their own: 2 * cell +
+/// back side.
 class PatchGrid {
 public:
     /// Keeps a reference. size: largest length of a cell along the triangle's first two edges [world].
@@ -27,12 +31,13 @@ public:
         const auto j = std::min<std::uint32_t>(c.along_v - 1u, static_cast<std::uint32_t>(hit.v * c.along_v));
         return 2 * (c.first + j * c.along_u + i) + static_cast<std::uint32_t>(hit.back_side);
     }
-    /// The place that stands for a patch, the centroid of its part of the triangle, as a hit on it.
+    /// The place that stands for a patch, the centroid of its part of the triangle, as a hit on it; of
+    /// several triangles, the centroid of that in their middle.
     Hit center(std::uint32_t patch) const;
-    /// The corners of the patch's part of the triangle, as hits, drawn in towards the centre by a
-    /// fiftieth; two may be the same.
+    /// The corners of the patch's part of the triangle that holds the centre, as hits, drawn in towards
+    /// the centre by a fiftieth; two may be the same.
     std::array<Hit, 4> corners(std::uint32_t patch) const;
-    /// Area of the patch's part of its triangle [world^2].
+    /// Area of the patch [world^2].
     float area(std::uint32_t patch) const;
 
 private:
@@ -50,9 +55,21 @@ private:
         double share = 0.0, u = 0.0, v = 0.0;
     };
     Part part(const Location& at) const;
+    float area_of(std::uint32_t triangle) const;
+    /// Gives triangles that are small their cells, from the first on.
+    void share_cells(const std::vector<std::uint32_t>& small, float size, std::uint32_t first);
+
+    /// A cell that triangles share.
+    struct Shared {
+        std::uint32_t middle; // the triangle that stands for it
+        float area;
+    };
 
     const Scene& scene_;
-    std::vector<Cells> cells_; // a triangle each
+    std::vector<Cells> cells_;          // a triangle each
+    std::vector<std::uint32_t> large_;  // the triangles with cells of their own, rising as their cells do
+    std::uint32_t first_shared_ = 0;
+    std::vector<Shared> shared_;        // the cells from first_shared_ on
     std::uint32_t count_ = 0;
 };
 
