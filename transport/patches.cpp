@@ -52,7 +52,7 @@ std::uint64_t hash_of(const Likeness& key) {
 } // namespace
 
 PatchGrid::PatchGrid(const Scene& scene, float size)
-    : scene_(scene), cells_(scene.triangles.size()) {
+    : scene_(scene), size_(size), cells_(scene.triangles.size()) {
     constexpr float most_along = 1024.0f;
     std::uint64_t cells = 0;
     std::vector<std::uint32_t> small;
@@ -76,16 +76,16 @@ PatchGrid::PatchGrid(const Scene& scene, float size)
                         + std::to_string(size) + "; choose a larger --coarse-radius");
     }
     first_shared_ = static_cast<std::uint32_t>(cells);
-    share_cells(small, size, first_shared_);
+    share_cells(small, first_shared_);
     count_ = 2 * (first_shared_ + static_cast<std::uint32_t>(shared_.size()));
 }
 
-void PatchGrid::share_cells(const std::vector<std::uint32_t>& small, float size, std::uint32_t first) {
+void PatchGrid::share_cells(const std::vector<std::uint32_t>& small, std::uint32_t first) {
     // By the upper half of their keys' hashes, then in their own order.
     const Vec3 origin = scene_.bounds().min();
     std::vector<std::uint64_t> order(small.size());
     parallel_for(static_cast<Index>(small.size()), [&](Index k) {
-        const std::uint64_t hash = hash_of(likeness_of(scene_, small[static_cast<std::size_t>(k)], origin, size));
+        const std::uint64_t hash = hash_of(likeness_of(scene_, small[static_cast<std::size_t>(k)], origin, size_));
         order[static_cast<std::size_t>(k)] = (hash & 0xffffffff00000000u) | small[static_cast<std::size_t>(k)];
     }, 4096);
     parallel_sort(order);
@@ -114,7 +114,7 @@ void PatchGrid::share_cells(const std::vector<std::uint32_t>& small, float size,
     Likeness last{};
     for (const std::uint64_t key : order) {
         const auto t = static_cast<std::uint32_t>(key);
-        const Likeness likeness = likeness_of(scene_, t, origin, size);
+        const Likeness likeness = likeness_of(scene_, t, origin, size_);
         if (likeness != last) finish(); // two keys of one hash may take turns: more cells, none wrong
         last = likeness;
         members.push_back(t);

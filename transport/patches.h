@@ -37,6 +37,8 @@ public:
     /// The corners of the patch's part of the triangle that holds the centre, as hits, drawn in towards
     /// the centre by a fiftieth; two may be the same.
     std::array<Hit, 4> corners(std::uint32_t patch) const;
+    /// How high the surface may rise between two places of the patch [world]: nothing where it is flat.
+    float relief(std::uint32_t patch) const { return patch / 2 >= first_shared_ ? 0.1f * size_ : 0.0f; }
     /// Area of the patch [world^2].
     float area(std::uint32_t patch) const;
 
@@ -57,7 +59,7 @@ private:
     Part part(const Location& at) const;
     float area_of(std::uint32_t triangle) const;
     /// Gives triangles that are small their cells, from the first on.
-    void share_cells(const std::vector<std::uint32_t>& small, float size, std::uint32_t first);
+    void share_cells(const std::vector<std::uint32_t>& small, std::uint32_t first);
 
     /// A cell that triangles share.
     struct Shared {
@@ -66,6 +68,7 @@ private:
     };
 
     const Scene& scene_;
+    float size_;
     std::vector<Cells> cells_;          // a triangle each
     std::vector<std::uint32_t> large_;  // the triangles with cells of their own, rising as their cells do
     std::uint32_t first_shared_ = 0;

@@ -61,20 +61,23 @@ Hit SenderRows::centre(std::uint32_t number) const {
     return grid_[level].center(number - first_[level]);
 }
 
-bool SenderRows::hidden(const Hit& hit, const Hit& centre) const {
-    return surface_.blocked(surface_.lifted(surface_.point(hit)),
-                            surface_.lifted(surface_.point(centre)));
+bool SenderRows::hidden(const SurfacePoint& x, const SurfacePoint& centre, float relief) const {
+    return surface_.blocked(surface_.lifted(x) + relief * x.normal,
+                            surface_.lifted(centre) + relief * centre.normal);
 }
 
 std::uint32_t SenderRows::side_of(const Hit& hit, std::uint32_t first) const {
-    return hidden(hit, centre(first)) ? second_.at(first) : first;
+    const int level = level_of(first);
+    return hidden(surface_.point(hit), surface_.point(centre(first)), grid_[level].relief(first - first_[level]))
+               ? second_.at(first)
+               : first;
 }
 
 void SenderRows::see(std::span<const Hit> arrivals) {
     const auto count = static_cast<Index>(arrivals.size());
     std::vector<std::uint8_t> is_hidden(arrivals.size());
-    std::vector<Vec3> place(arrivals.size()); // lifted off the surface
-    parallel_for(count, [&](Index k) { place[k] = surface_.lifted(surface_.point(arrivals[k])); }, 1024);
+    std::vector<SurfacePoint> place(arrivals.size());
+    parallel_for(count, [&](Index k) { place[k] = surface_.point(arrivals[k]); }, 1024);
     std::vector<std::uint64_t> order(arrivals.size()); // patch in the upper half, arrival in the lower
     const auto patch_of = [&](std::size_t n) { return static_cast<std::uint32_t>(order[n] >> 32); };
     const auto arrival_of = [](std::uint64_t key) { return static_cast<std::uint32_t>(key); };
@@ -96,13 +99,14 @@ void SenderRows::see(std::span<const Hit> arrivals) {
         std::vector<Sides> sides(groups.size());
         parallel_for(static_cast<Index>(groups.size()), [&](Index g) {
             const auto patch = static_cast<std::uint32_t>(groups[g].front() >> 32);
+            const float relief = grid.relief(patch);
             Hit centre = grid.center(patch);
             const auto look_from = [&](const Hit& from) {
                 centre = from;
-                const Vec3 eye = surface_.lifted(surface_.point(centre));
+                const SurfacePoint eye = surface_.point(centre);
                 std::uint32_t seen = 0;
                 for (const std::uint64_t key : groups[g])
-                    seen += !(is_hidden[arrival_of(key)] = surface_.blocked(place[arrival_of(key)], eye));
+                    seen += !(is_hidden[arrival_of(key)] = hidden(place[arrival_of(key)], eye, relief));
                 return seen;
             };
             if (look_from(centre) == 0)
@@ -118,7 +122,7 @@ void SenderRows::see(std::span<const Hit> arrivals) {
             for (const Hit& corner : grid.corners(patch)) {
                 const float d = (surface_.point(corner).position - surface_.point(centre).position)
                                     .squaredNorm();
-                if (d <= farthest || !hidden(corner, centre)) continue;
+                if (d <= farthest || !hidden(surface_.point(corner), surface_.point(centre), relief)) continue;
                 farthest = d;
                 sides[g].second = corner;
             }

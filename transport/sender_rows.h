@@ -86,7 +86,7 @@ private:
 
     int level_of(std::uint32_t number) const;
     Hit centre(std::uint32_t number) const;
-    bool hidden(const Hit& hit, const Hit& centre) const;
+    bool hidden(const SurfacePoint& x, const SurfacePoint& centre, float relief) const;
     std::uint32_t side_of(const Hit& hit, std::uint32_t first) const;
     std::uint32_t hits(std::uint32_t number) const {
         return hits_.empty() ? 0 : hits_[number - first_.back()];
