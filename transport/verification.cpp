@@ -168,7 +168,7 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
     const auto lights = static_cast<Index>(trial_.lights.size());
     const auto places = static_cast<Index>(trial_.places.size());
     VerifiedError all;
-    double squares = 0.0, variance = 0.0; // of the sum of squares
+    double squares = 0.0, fourths = 0.0, variance = 0.0; // the last of the sum of squares
     int lit = 0;
     for (Index l = 0; l < lights; ++l) {
         const auto of_light = Eigen::seqN(l, places, lights);
@@ -180,6 +180,7 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
             compare_with_reference(found, indirect, reference_.standard_error(Eigen::all, of_light));
         ++lit;
         squares += error.rel_rmse * error.rel_rmse;
+        fourths += std::pow(error.rel_rmse, 4);
         variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);
         if (!all.any() || error.rel_rmse > all.worst) {
             all.worst = error.rel_rmse;
@@ -191,6 +192,8 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
     if (lit == 0) return {};
     all.lights = static_cast<int>(lights);
     all.rel_rmse = std::sqrt(squares / lit);
+    if (lit > 1)
+        all.spread = std::sqrt(std::max(0.0, fourths / lit - std::pow(squares / lit, 2)) * lit / (lit - 1.0));
     if (all.rel_rmse > 0.0) all.standard_error = std::sqrt(variance) / lit / (2.0 * all.rel_rmse);
     return all;
 }

@@ -38,6 +38,7 @@ struct VerifiedError {
                                  // relRMSE, the path tracer's own variance taken out
     double standard_error = 0.0; // of rel_rmse, over the choice of places (jackknife of 20 groups)
     double worst = 0.0;          // relRMSE under the light that has the largest
+    double spread = 0.0;         // standard deviation over the lights of the squared relRMSE
     double bias = 0.0;           // mean error over mean, under that light
     double reference_error = 0.0; // there
     int lights = 0, places = 0;
