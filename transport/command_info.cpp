@@ -80,14 +80,15 @@ void print_text(const TransferFile& file) {
         verified.lights = json.value("lights", 0);
         std::printf("verified    %s\n", verified.text().c_str());
     }
-    std::printf("level  functions    spacing       links  links a function\n");
+    std::printf("level  functions    spacing       links  links a function  megabytes of links\n");
     for (int l = 0; l < transfer.points.levels(); ++l) {
         const std::uint32_t functions = transfer.points.end(l) - transfer.points.begin(l);
         const std::uint64_t links = transfer.link_count(l);
-        std::printf("%5d  %9u  %9.4g  %10llu  %16.1f\n", l, functions,
+        std::printf("%5d  %9u  %9.4g  %10llu  %16.1f  %18.2f\n", l, functions,
                     static_cast<double>(transfer.points.spacing[static_cast<std::size_t>(l)]),
                     static_cast<unsigned long long>(links),
-                    static_cast<double>(links) / std::max(1u, functions));
+                    static_cast<double>(links) / std::max(1u, functions),
+                    1e-6 * static_cast<double>(transfer.link_bytes(l)));
     }
 }
 

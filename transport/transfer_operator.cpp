@@ -22,6 +22,13 @@ std::uint64_t TransferOperator::link_count() const {
     return kind == OperatorKind::paper ? solution.entries() : links.count(0, links.rows());
 }
 
+std::uint64_t TransferOperator::link_bytes(int level) const {
+    const std::uint32_t first = points.begin(level), last = points.end(level);
+    return kind == OperatorKind::paper
+               ? (solution.begin[last] - solution.begin[first]) * (sizeof(std::uint32_t) + sizeof(RgbLink))
+               : (links.begin[last] - links.begin[first]) * sizeof(PackedLink);
+}
+
 LightTransport::LightTransport(const TransferOperator& transfer, const Surface& surface)
     : transfer_(transfer), surface_(surface) {
     if (transfer.kind == OperatorKind::neumann)

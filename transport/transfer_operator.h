@@ -46,6 +46,8 @@ struct TransferOperator {
     /// The stored links of the receivers of a level, or of all.
     std::uint64_t link_count(int level) const;
     std::uint64_t link_count() const;
+    /// What these take in a file.
+    std::uint64_t link_bytes(int level) const;
 };
 
 /// Three numbers (R, G, B) a sender point: its radiosity [W/m^2].

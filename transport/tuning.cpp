@@ -90,7 +90,9 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
 
-        const double wanted = std::pow(aim * tuning.target_error / error, 1.0 / order_of(result.steps));
+        // Where single places decide, less may do than it seems.
+        const double hoped = std::max(tuning.target_error, error - last.error.standard_error);
+        const double wanted = std::pow(aim * tuning.target_error / hoped, 1.0 / order_of(result.steps));
         double scale = last.coarse_scale * std::clamp(wanted, 0.15, 0.8);
         scale = std::max(scale, static_cast<double>(finest_scale));
         // As fine as the limits let it be, if that is worth a step.

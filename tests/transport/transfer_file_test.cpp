@@ -37,6 +37,19 @@ TEST(TransferFile, SavedLoadedAndSavedAgainItHasTheSameBytes) {
     }
 }
 
+TEST(TransferFile, TellsWhatTheLinksOfEachLevelTake) {
+    const TemporaryFolder folder;
+    const SmallTransfer& small = small_transfer();
+    save_transfer(folder.path("a"), small.transfer, small.provenance);
+    const TransferFile loaded = load_transfer(folder.path("a"));
+    std::uint64_t of_levels = 0, of_tensor = 0;
+    for (int l = 0; l < loaded.transfer.points.levels(); ++l) of_levels += loaded.transfer.link_bytes(l);
+    for (const auto& [name, bytes] : loaded.tensor_bytes)
+        if (name == "links.packed") of_tensor = bytes;
+    EXPECT_GT(of_tensor, 0u);
+    EXPECT_EQ(of_levels, of_tensor);
+}
+
 TEST(TransferFile, TheSameLightComesOutOfTheFile) {
     const TemporaryFolder folder;
     for (const SmallTransfer* small : {&small_transfer(), &small_paper_transfer()}) {
