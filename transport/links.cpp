@@ -284,7 +284,7 @@ std::uint64_t rays_of_all(const LinkOptions& options, const PointHierarchy& poin
 float link_threshold(const LinkOptions& options, const PointHierarchy& points) {
     const double share = std::min(1.0, points.size() / 60'000.0);
     return options.threshold.value_or(
-        static_cast<float>(0.045 * options.target_error * share));
+        static_cast<float>(0.06 * options.target_error * share));
 }
 
 GatherDirections gather_directions(const LinkOptions& options, const PointHierarchy& points,

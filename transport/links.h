@@ -44,7 +44,7 @@ struct LinkStatistics {
     std::uint64_t patches = 0, uncovered_patches = 0;
 };
 
-/// The threshold that is given, or 0.045 target_error min(1, N / 60 000) for N points: what is
+/// The threshold that is given, or 0.06 target_error min(1, N / 60 000) for N points: what is
 /// dropped is a sum of links each below the threshold, so the error is taken to grow in proportion to
 /// it; and a scene of few points can have more links to each, its file stays small.
 float link_threshold(const LinkOptions& options, const PointHierarchy& points);
