@@ -27,25 +27,23 @@ double peak_memory() {
     return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-/// Lights differ, and the next three may be harder than most: their mean square is off by its standard error
-/// in one case of six. An error of which that is no more than a tenth above the target will do.
-double cautious(const VerifiedError& error) {
-    constexpr double next_lights = 3.0, allowed = 1.1;
-    const double pessimistic =
-        std::sqrt(error.rel_rmse * error.rel_rmse + error.spread / std::sqrt(next_lights));
-    return std::max(error.rel_rmse, pessimistic / allowed);
-}
-
 /// The order of the error as the last two steps show it.
 double order_of(const std::vector<TuningStep>& steps) {
     if (steps.size() < 2) return expected_order;
     const TuningStep &a = steps[steps.size() - 2], &b = steps.back();
-    const double order = std::log(cautious(a.error) / cautious(b.error))
+    const double order = std::log(cautious_error(a.error) / cautious_error(b.error))
                          / std::log(static_cast<double>(a.coarse_scale / b.coarse_scale));
     return std::clamp(order, 0.5, 1.2);
 }
 
 } // namespace
+
+double cautious_error(const VerifiedError& error) {
+    constexpr double next_lights = 3.0, allowed = 1.1;
+    const double pessimistic =
+        std::sqrt(error.rel_rmse * error.rel_rmse + error.spread / std::sqrt(next_lights));
+    return std::max(error.rel_rmse, pessimistic / allowed);
+}
 
 std::uint64_t verification_rays(const PrecomputeReport& report) {
     return std::max<std::uint64_t>(4'000'000, (report.links.rays + report.points_rays) / 5);
@@ -85,7 +83,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
             options.coarse_scale = 1.0f;
             continue;
         }
-        const double error = cautious(last.error);
+        const double error = cautious_error(last.error);
         if (error <= std::max(safely * tuning.target_error, tuning.target_error - last.error.standard_error)) break;
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
@@ -101,7 +99,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
                                * std::pow(last.seconds / std::max(1e-9, tuning.most_seconds - elapsed()), 1.0 / cost_order);
         const double of_memory =
             last.coarse_scale
-            * std::pow((peak_memory() - memory_before) / std::max(1.0, tuning.most_bytes - memory_before),
+            * std::pow(std::max(1.0, peak_memory() - memory_before) / std::max(1.0, tuning.most_bytes - memory_before),
                        1.0 / cost_order);
         if (std::max(of_time, of_memory) > scale) {
             scale = std::max(of_time, of_memory);
@@ -112,7 +110,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         }
         options.coarse_scale = static_cast<float>(scale);
     }
-    if (cautious(result.steps.back().error) <= tuning.target_error) result.end = TuningEnd::reached;
+    if (cautious_error(result.steps.back().error) <= tuning.target_error) result.end = TuningEnd::reached;
     return std::move(*transfer);
 }
 

@@ -14,6 +14,10 @@ namespace afterglow {
 /// small scenes what it takes to say anything.
 std::uint64_t verification_rays(const PrecomputeReport& report);
 
+/// Lights differ, and the next three may be harder than most: their mean square is off by its standard error
+/// in one case of six. What a step's error counts as: itself, or that, of which a tenth above the target will do.
+double cautious_error(const VerifiedError& error);
+
 struct TuningStep {
     float coarse_scale = 1.0f; // of PrecomputeOptions
     VerifiedError error;       // under lights and at places that all steps share
