@@ -80,13 +80,13 @@ public:
                      std::vector<char>& accepted) {
         const std::size_t count = end - begin;
         accepted.assign(count, 0);
-        features_.assign(count, std::nullopt);
+        std::vector<std::optional<Openness>> features(count);
         // Most conflict with darts of earlier rounds already, in whatever order they are looked at.
         std::vector<char> fits_so_far(count);
         parallel_for(static_cast<Index>(count), [&](Index i) {
             const SurfacePoint& x = source[begin + i].at;
             const std::int32_t cell = index_.find(key_of(x.position));
-            fits_so_far[i] = cell < 0 || fits(cells_[cell], x, refining, features_[i]);
+            fits_so_far[i] = cell < 0 || fits(cells_[cell], x, refining, features[i]);
         });
         std::array<std::vector<std::int32_t>, 8> classes;
         for (std::size_t i = 0; i < count; ++i) {
@@ -102,7 +102,7 @@ public:
                 [&](Index c) {
                     Cell& cell = cells_[same_parity[c]];
                     for (const std::uint32_t i : cell.waiting)
-                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, refining, features_[i]);
+                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, refining, features[i]);
                     cell.waiting.clear();
                 },
                 16);
@@ -227,7 +227,6 @@ private:
     const Surface& surface_;
     const PoissonDiskOptions& options_;
     OpennessProbe probe_;
-    std::vector<std::optional<Openness>> features_; // of this round's candidates
     std::vector<Cell> cells_;
     CellIndex index_;
 };

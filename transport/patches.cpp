@@ -11,7 +11,6 @@
 #include <utility>
 
 namespace afterglow {
-
 namespace {
 
 /// Centroid and normal of a triangle of no given length; nothing where it has no area.
@@ -76,11 +75,11 @@ PatchGrid::PatchGrid(const Scene& scene, float size)
                         + std::to_string(size) + "; choose a larger --coarse-radius");
     }
     first_shared_ = static_cast<std::uint32_t>(cells);
-    share_cells(small, first_shared_);
+    share_cells(small);
     count_ = 2 * (first_shared_ + static_cast<std::uint32_t>(shared_.size()));
 }
 
-void PatchGrid::share_cells(const std::vector<std::uint32_t>& small, std::uint32_t first) {
+void PatchGrid::share_cells(const std::vector<std::uint32_t>& small) {
     // By the upper half of their keys' hashes, then in their own order.
     const Vec3 origin = scene_.bounds().min();
     std::vector<std::uint64_t> order(small.size());
@@ -130,7 +129,7 @@ void PatchGrid::share_cells(const std::vector<std::uint32_t>& small, std::uint32
     std::vector<Shared> sorted(shared_.size());
     for (std::size_t k = 0; k < sorted.size(); ++k) {
         const auto old = static_cast<std::uint32_t>(by_member[k]);
-        number[old] = first + static_cast<std::uint32_t>(k);
+        number[old] = first_shared_ + static_cast<std::uint32_t>(k);
         sorted[k] = shared_[old];
     }
     shared_ = std::move(sorted);

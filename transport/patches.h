@@ -58,8 +58,8 @@ private:
     };
     Part part(const Location& at) const;
     float area_of(std::uint32_t triangle) const;
-    /// Gives triangles that are small their cells, from the first on.
-    void share_cells(const std::vector<std::uint32_t>& small, std::uint32_t first);
+    /// Gives triangles that are small their cells, from first_shared_ on.
+    void share_cells(const std::vector<std::uint32_t>& small);
 
     /// A cell that triangles share.
     struct Shared {

@@ -1,9 +1,8 @@
 #include "transport/tuning.h"
 
+#include "core/peak_memory.h"
 #include "core/sampling.h"
 #include "core/seconds.h"
-
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -19,13 +18,6 @@ constexpr int most_steps = 5;
 constexpr double aim = 0.8, safely = 0.9;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
-
-/// The largest resident memory of this process so far [byte].
-double peak_memory() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return 1024.0 * static_cast<double>(usage.ru_maxrss);
-}
 
 /// The order of the error as the last two steps show it.
 double order_of(const std::vector<TuningStep>& steps) {

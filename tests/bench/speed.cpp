@@ -1,5 +1,6 @@
 #include "basis/openness.h"
 #include "core/parallel.h"
+#include "core/peak_memory.h"
 #include "core/sampling.h"
 #include "core/seconds.h"
 #include "transport/moving_light.h"
@@ -9,15 +10,12 @@
 #include <CLI/CLI.hpp>
 #include <embree3/rtcore.h>
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -128,12 +126,6 @@ double features_alone(const Surface& surface, const PointHierarchy& points) {
     return seconds_since(start);
 }
 
-double peak_megabytes() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return 1e-3 * static_cast<double>(usage.ru_maxrss);
-}
-
 struct Run {
     double total, points, links, alone, features;
 };
@@ -151,7 +143,7 @@ void run_precompute(const std::vector<std::string>& names, int repeat, bool one_
     std::printf("%-14s %9s %8s %8s %8s %8s %8s %8s\n", "scene", "total s", "links s", "Embree s", "ratio",
                 "points", "features", "threads");
     for (const std::string& name : names) {
-        const double before = peak_megabytes();
+        const double before = peak_memory();
         const Scene scene = load_scene(name);
         const Surface surface(scene);
         const EmbreeAlone embree(scene);
@@ -172,7 +164,7 @@ void run_precompute(const std::vector<std::string>& names, int repeat, bool one_
         std::printf("%-14s %9.2f %8.2f %8.2f %8.2f %8.3f %8.3f %8.2f  (%.0f MB at most)\n",
                     name.substr(slash == std::string::npos ? 0 : slash + 1).c_str(), best.total, best.links,
                     best.alone, best_ratio, best.points / best.total, best.features / best.total,
-                    single / best.total, peak_megabytes() - before);
+                    single / best.total, 1e-6 * (peak_memory() - before));
         std::fflush(stdout);
     }
 }
