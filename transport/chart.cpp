@@ -1,8 +1,10 @@
 #include "transport/chart.h"
 
+#include "core/camera.h"
 #include "core/error.h"
 #include "core/sampling.h"
 #include "core/seconds.h"
+#include "transport/display.h"
 #include "transport/path_tracer.h"
 #include "transport/transfer_file.h"
 #include "transport/tuning.h"
@@ -83,11 +85,11 @@ std::vector<ChartSetting> chart_settings(bool brief, std::uint64_t seed) {
 ChartBench::ChartBench(const Surface& surface, std::string folder, std::uint64_t seed)
     : surface_(surface), folder_(std::move(folder)), seed_(seed),
       verifier_(surface, find_viewpoints(surface, seed), trial_options(seed)) {
-    if (verifier_.trial().places.empty()) throw Error("hardly anything is in sight: there is nothing to chart");
+    if (verifier_.trials().empty()) throw Error("hardly anything is in sight: there is nothing to chart");
 }
 
 ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
-    const Trial& trial = verifier_.trial();
+    const Trial& trial = verifier_.trials().front();
     ChartPoint point;
     point.sweep = setting.sweep;
     point.value = setting.value;
@@ -150,11 +152,61 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     point.update_seconds = 1e30;
     for (int k = 0; k < 3; ++k) {
         const auto begin = Clock::now();
-        transport.indirect(verifier_.trial().lights[0]);
+        transport.indirect(verifier_.trials().front().lights[0]);
         point.update_seconds = std::min(point.update_seconds, seconds_since(begin));
     }
     point.error = verifier_.error_of(transfer);
+    if (setting.sweep == "spacing") point.parts = verifier_.parts_of(transfer, {.places = chart_places, .rays = 2048});
     return point;
+}
+
+ErrorMap ChartBench::error_map() const {
+    PrecomputeOptions options;
+    options.seed = seed_;
+    const TransferOperator transfer = precompute(surface_, options);
+    const Trial& trial = verifier_.trials().front();
+    const auto hardest = static_cast<std::size_t>(verifier_.error_of(transfer).worst_light);
+    const Spotlight& light = trial.lights[hardest];
+    const Hit lit = surface_.closest_hit({light.position, light.direction});
+    Camera camera{.position = trial.eyes[2 * hardest + 1], .vertical_fov = 60.0f, .width = 192, .height = 108};
+    camera.target = light.position + (lit ? lit.distance : 1.0f) * light.direction;
+    // An eye straight above or below what is lit has another idea of what is up.
+    if ((camera.target - camera.position).normalized().cross(camera.up).norm() < 0.1f) camera.up = Vec3::UnitZ();
+    camera.check();
+
+    std::vector<SurfacePoint> places;
+    std::vector<std::size_t> pixel_of;
+    ErrorMap map;
+    map.width = camera.width;
+    map.height = camera.height;
+    for (int y = 0; y < map.height; ++y)
+        for (int x = 0; x < map.width; ++x)
+            if (const Hit hit = surface_.closest_hit(
+                    {camera.position, camera.direction(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f)})) {
+                pixel_of.push_back(static_cast<std::size_t>(y * map.width + x));
+                places.push_back(surface_.point(hit));
+            }
+    PathTracerOptions tracer;
+    tracer.strategy = PathStrategy::connected;
+    tracer.target_error = 0.03;
+    tracer.max_samples = 4096;
+    tracer.seed = hash64(seed_, 0x3a9);
+    const IrradianceEstimate reference = estimate_irradiance(surface_, {&light, 1}, places, tracer);
+    const Eigen::Array3Xf found =
+        Display(transfer, surface_).irradiance(places, LightTransport(transfer, surface_).indirect(light), light);
+    const VerifiedError error = compare_with_reference(found, reference.indirect, reference.standard_error);
+    map.rel_rmse = error.rel_rmse;
+    map.reference_error = error.reference_error;
+    const auto mean = static_cast<float>(reference.indirect.cast<double>().mean());
+    const auto pixels = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+    map.reference.assign(pixels, -1.0f);
+    map.difference.assign(pixels, 0.0f);
+    for (std::size_t k = 0; k < places.size(); ++k) {
+        const auto column = static_cast<Index>(k);
+        map.reference[pixel_of[k]] = reference.indirect.col(column).mean() / mean;
+        map.difference[pixel_of[k]] = (found - reference.indirect).col(column).mean() / mean;
+    }
+    return map;
 }
 
 } // namespace afterglow

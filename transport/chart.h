@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/surface.h"
+#include "transport/error_parts.h"
 #include "transport/precompute.h"
 #include "transport/verification.h"
 
@@ -26,6 +27,7 @@ struct ChartPoint {
     double points_seconds = 0.0, push_seconds = 0.0, pull_seconds = 0.0, gather_seconds = 0.0,
            rows_seconds = 0.0, links_seconds = 0.0, series_seconds = 0.0, tuning_seconds = 0.0;
     VerifiedError error; // under lights and at places that all points of a scene share
+    ErrorParts parts;    // of the sweep "spacing"
 };
 
 struct ChartSetting {
@@ -53,6 +55,15 @@ struct ChartSetting {
 /// `brief`: a few coarse points of spacing, target, path and paper.
 std::vector<ChartSetting> chart_settings(bool brief, std::uint64_t seed);
 
+/// A picture of an operator's error: seen from an open place, what the trial's hardest light lights.
+struct ErrorMap {
+    int width = 0, height = 0;
+    double rel_rmse = 0.0, reference_error = 0.0; // of the picture
+    /// Of each pixel, rows from the top, relative to the picture's mean irradiance: the reference, and what the
+    /// operator says more. Negative and zero where nothing is seen.
+    std::vector<float> reference, difference;
+};
+
 /// Measures settings of one scene, all with the same lights and places.
 class ChartBench {
 public:
@@ -60,6 +71,8 @@ public:
     /// Throws Error where hardly anything is in sight.
     ChartBench(const Surface& surface, std::string folder, std::uint64_t seed);
     ChartPoint measure(const ChartSetting& setting) const;
+    /// Of a precomputation with default settings.
+    ErrorMap error_map() const;
     /// R_0 that precompute() finds by itself [world]: of the first point with one.
     void set_usual_radius(float radius) { usual_radius_ = radius; }
 

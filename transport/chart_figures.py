@@ -3,7 +3,9 @@ import json
 import pathlib
 
 import matplotlib
+import numpy as np
 matplotlib.use("Agg")
+import matplotlib.colors
 import matplotlib.pyplot as plt
 from matplotlib.ticker import FuncFormatter
 
@@ -61,7 +63,24 @@ def finish(figure, name, about):
     plt.close(figure)
 
 
-def error_against(scene, key, label, factor, sweeps, name):
+def floors(scene):
+    """What the error of the spacing by hand is made of, against time."""
+    points = sorted(runs(scene, "spacing"), key=lambda p: p["seconds"])
+    return [([(p["seconds"], p[f"{part}_error"]) for p in points if p[f"{part}_error"] > 0], style, text)
+            for part, style, text in (("senders", "-", "floor: senders"), ("links", "--", "floor: rays and dropped links"),
+                                      ("receivers", ":", "floor: between receivers"))]
+
+
+def other_links(scene):
+    """The spacing by hand, had links been stored in other ways: the same error, other bytes."""
+    points = sorted(runs(scene, "spacing"), key=lambda p: p["bytes"])
+    stored = 3  # bytes of a packed link
+    return [([(p["bytes"] + (size - stored) * p["links"], p["rel_rmse"]) for p in points], style, text)
+            for size, style, text in ((16, "-", "computed: floats and an index"), (10, "--", "computed: half floats and an index"),
+                                      (2, ":", "computed: scalar, packed"))]
+
+
+def error_against(scene, key, label, factor, sweeps, name, extra=()):
     figure, axes = plt.subplots(figsize=(6.4, 4.4))
     for sweep in sweeps:
         points = sorted(runs(scene, sweep), key=lambda p: p[key])
@@ -72,6 +91,9 @@ def error_against(scene, key, label, factor, sweeps, name):
         axes.errorbar([factor * p[key] for p in points], error, yerr=bar, color=colour, marker=marker,
                       markersize=5, linewidth=1.2, capsize=2, label=text,
                       linestyle="--" if sweep == "path" else "-")
+    for points, style, text in extra:
+        axes.plot([factor * x for x, _ in points], [100 * y for _, y in points], style, color="#888888",
+                  linewidth=1.0, label=text)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(plain)
     axes.set_xlabel(label)
@@ -136,6 +158,33 @@ def stages(scene):
     finish(figure, f"stages_{file_name(scene)}", scene)
 
 
+def picture(scene):
+    """Where the error of default settings lies, under the hardest light."""
+    file = folder / f"map_{file_name(scene)}.json"
+    if not file.exists():
+        return
+    data = json.loads(file.read_text())
+    shape = (data["height"], data["width"])
+    reference = np.array(data["reference"]).reshape(shape)
+    difference = np.ma.masked_where(reference < 0, np.array(data["difference"]).reshape(shape))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.6, 3.2))
+    shown = left.imshow(np.ma.masked_where(reference < 0, reference), cmap="viridis",
+                        norm=matplotlib.colors.LogNorm(0.01, max(1.0, reference.max())))
+    figure.colorbar(shown, ax=left, label="irradiance / mean", shrink=0.85)
+    left.set_title("path tracer", fontsize=9)
+    shown = right.imshow(difference, cmap="PuOr",
+                         norm=matplotlib.colors.SymLogNorm(linthresh=0.02, vmin=-1.0, vmax=1.0))
+    figure.colorbar(shown, ax=right, label="(ours - path tracer) / mean", shrink=0.85,
+                    ticks=[-1, -0.1, 0, 0.1, 1], format=plain)
+    right.set_title(f"error: relRMSE {100 * data['rel_rmse']:.1f} %, the path tracer's noise "
+                    f"{100 * data['reference_error']:.1f} %", fontsize=9)
+    for axes in (left, right):
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.grid(False)
+    finish(figure, f"error_map_{file_name(scene)}", f"{scene}, the hardest of its lights, default settings")
+
+
 def break_even():
     """Precomputation over a path traced picture of equal error: its error goes like time to the -1/2."""
     figure, axes = plt.subplots(figsize=(6.4, 4.4))
@@ -169,10 +218,12 @@ def break_even():
 
 
 for scene in scenes:
-    error_against(scene, "seconds", "time [s]", 1.0, LOOKS, "error_time")
+    error_against(scene, "seconds", "time [s]", 1.0, LOOKS, "error_time", floors(scene))
     operators = [sweep for sweep in LOOKS if sweep != "path"]
-    error_against(scene, "bytes", "transfer file [MB]", 1e-6, operators, "error_bytes")
+    error_against(scene, "bytes", "transfer file [MB]", 1e-6, operators, "error_bytes", other_links(scene))
     error_against(scene, "update_seconds", "one update of light [ms]", 1e3, operators, "error_update")
     parameters(scene)
-    stages(scene)
+    if runs(scene, "spacing"):
+        stages(scene)
+    picture(scene)
 break_even()

@@ -19,6 +19,7 @@
 #include <memory>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace afterglow {
@@ -30,6 +31,7 @@ struct ChartCommand {
     std::vector<std::string> scenes;
     std::string output;
     bool brief = false;
+    std::vector<std::string> sweeps; // those that are measured; empty: all
     RunOptions run;
 };
 
@@ -56,7 +58,23 @@ Json point_json(const std::string& scene, const std::string& hash, const ChartPo
             {"rel_rmse", p.error.rel_rmse},
             {"standard_error", p.error.standard_error},
             {"worst", p.error.worst},
+            {"senders_error", p.parts.senders.rms},
+            {"links_error", p.parts.links.rms},
+            {"receivers_error", p.parts.receivers.rms},
             {"reference_error", p.error.reference_error}};
+}
+
+Json map_json(const std::string& scene, const ErrorMap& map) {
+    return {{"scene", scene},           {"width", map.width},
+            {"height", map.height},     {"rel_rmse", map.rel_rmse},
+            {"reference_error", map.reference_error},
+            {"reference", map.reference}, {"difference", map.difference}};
+}
+
+/// As the figures' names have it.
+std::string file_name(std::string scene) {
+    std::replace_if(scene.begin(), scene.end(), [](char c) { return c == ':' || c == '/'; }, '_');
+    return scene;
 }
 
 /// The processor's name, where the system tells it.
@@ -128,16 +146,37 @@ private:
     Json head_, runs_ = Json::array();
 };
 
+/// Errors that depend on R_0 alone need the points of "spacing", which come first.
+std::vector<ChartSetting> wanted_settings(const ChartCommand& command) {
+    std::vector<ChartSetting> settings = chart_settings(command.brief, command.run.seed);
+    for (const std::string& sweep : command.sweeps)
+        if (std::none_of(settings.begin(), settings.end(), [&](const ChartSetting& s) { return s.sweep == sweep; }))
+            throw UsageError("--sweeps knows no '" + sweep + "'" + (command.brief ? " with --brief" : ""));
+    const auto is_wanted = [&](const std::string& sweep) {
+        return command.sweeps.empty() || std::count(command.sweeps.begin(), command.sweeps.end(), sweep) > 0;
+    };
+    const bool by_radius = std::any_of(settings.begin(), settings.end(), [&](const ChartSetting& s) {
+        return s.radius_share > 0.0f && is_wanted(s.sweep);
+    });
+    std::erase_if(settings, [&, first = true](const ChartSetting& s) mutable {
+        const bool tells_radius = std::exchange(first, false) && by_radius;
+        return !is_wanted(s.sweep) && !tells_radius;
+    });
+    return settings;
+}
+
 void measure_scene(const ChartCommand& command, const std::string& path, Runs& runs) {
-    const std::vector<ChartSetting> settings = chart_settings(command.brief, command.run.seed);
+    const std::vector<ChartSetting> settings = wanted_settings(command);
     const std::string name = path.starts_with("builtin:") ? path : std::filesystem::path(path).stem().string();
     const Scene scene = load_scene(path);
     const std::string hash = scene.content_hash();
     runs.expect_scene(name, hash);
+    const std::string map_file = command.output + "/map_" + file_name(name) + ".json";
+    const bool wants_map = !command.brief && command.sweeps.empty() && !std::filesystem::exists(map_file);
     const bool is_done = std::all_of(settings.begin(), settings.end(), [&](const ChartSetting& setting) {
         return runs.find(name, setting) != nullptr;
     });
-    if (is_done) return;
+    if (is_done && !wants_map) return;
     const Surface surface(scene);
     if (!command.run.quiet) std::fprintf(stderr, "%s: tracing the reference\n", name.c_str());
     ChartBench bench(surface, command.output, command.run.seed);
@@ -154,6 +193,10 @@ void measure_scene(const ChartCommand& command, const std::string& path, Runs& r
         if (setting.sweep == "spacing")
             bench.set_usual_radius(runs.find(name, setting)->value("coarse_radius", 0.0f)
                                    / setting.options.coarse_scale);
+    }
+    if (wants_map) {
+        if (!command.run.quiet) std::fprintf(stderr, "%s: a picture of the error\n", name.c_str());
+        write_file(map_file, map_json(name, bench.error_map()).dump() + "\n");
     }
 }
 
@@ -193,6 +236,10 @@ void add_chart_command(CLI::App& app) {
     sub->add_option("-o,--output", command->output,
                     "Folder; what is measured there already is not measured again")->required();
     sub->add_flag("--brief", command->brief, "A few coarse points alone, in seconds");
+    sub->add_option("--sweeps", command->sweeps,
+                    "Some of them alone: spacing, target, path, paper, dense, flat, rays, receiver_levels, "
+                    "sender_levels, threshold, bounces")
+        ->delimiter(',');
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);
     sub->callback([command] { run(*command); });

@@ -1,5 +1,6 @@
 #include "transport/command_info.h"
 
+#include "transport/error_parts.h"
 #include "transport/transfer_file.h"
 #include "transport/verification.h"
 
@@ -79,6 +80,13 @@ void print_text(const TransferFile& file) {
         verified.places = json.value("places", 0);
         verified.lights = json.value("lights", 0);
         std::printf("verified    %s\n", verified.text().c_str());
+        if (const Json parts = json.value("parts", Json()); parts.is_object()) {
+            const auto part = [&](const char* name) -> ErrorPart {
+                const Json pair = parts.value(name, Json());
+                return pair.is_array() && pair.size() == 2 ? ErrorPart{pair[0].get<double>(), pair[1].get<double>()} : ErrorPart{};
+            };
+            std::printf("of which    %s\n", ErrorParts{part("senders"), part("links"), part("receivers")}.text().c_str());
+        }
     }
     std::printf("level  functions    spacing       links  links a function  megabytes of links\n");
     for (int l = 0; l < transfer.points.levels(); ++l) {

@@ -6,6 +6,7 @@
 #include "core/progress.h"
 #include "core/sampling.h"
 #include "transport/cli_options.h"
+#include "transport/error_parts.h"
 #include "transport/precompute.h"
 #include "transport/provenance.h"
 #include "transport/transfer_file.h"
@@ -75,6 +76,10 @@ double rounded(double value) {
     return std::stod(text.data());
 }
 
+Json part_json(const ErrorPart& part) {
+    return {rounded(part.rms), rounded(part.standard_error)};
+}
+
 Json vector_json(const Vec3& v) {
     return {v.x(), v.y(), v.z()};
 }
@@ -97,9 +102,15 @@ Json options_json(const PrecomputeCommand& command) {
     return json;
 }
 
+/// How far it is from the path tracer, and why.
+struct Verification {
+    VerifiedError error;
+    ErrorParts parts;
+};
+
 /// Counts and measures of length: nothing that differs from run to run.
 Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& report,
-                     const LinkCounts& links, const VerifiedError& verified,
+                     const LinkCounts& links, const Verification& verified,
                      const TuningReport& tuning) {
     Json viewpoints = Json::array(), levels = Json::array();
     for (const Vec3& viewpoint : report.viewpoints)
@@ -122,14 +133,18 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
             {"rays_of_links", report.links.rays},
             {"patch_rows", report.links.patches},
             {"uncovered_patch_rows", report.links.uncovered_patches}};
-    if (verified.any())
-        json["verified"] = {{"rel_rmse", rounded(verified.rel_rmse)},
-                            {"standard_error", rounded(verified.standard_error)},
-                            {"worst", rounded(verified.worst)},
-                            {"bias", rounded(verified.bias)},
-                            {"reference_error", rounded(verified.reference_error)},
-                            {"places", verified.places},
-                            {"lights", verified.lights}};
+    if (const VerifiedError& error = verified.error; error.any())
+        json["verified"] = {{"rel_rmse", rounded(error.rel_rmse)},
+                            {"standard_error", rounded(error.standard_error)},
+                            {"worst", rounded(error.worst)},
+                            {"bias", rounded(error.bias)},
+                            {"reference_error", rounded(error.reference_error)},
+                            {"places", error.places},
+                            {"lights", error.lights}};
+    if (const ErrorParts& parts = verified.parts; parts.any())
+        json["verified"]["parts"] = {{"senders", part_json(parts.senders)},
+                                     {"links", part_json(parts.links)},
+                                     {"receivers", part_json(parts.receivers)}};
     for (const TuningStep& step : tuning.steps)
         json["tuning"].push_back({{"coarse_scale", rounded(step.coarse_scale)},
                                   {"rel_rmse", rounded(step.error.rel_rmse)},
@@ -138,12 +153,15 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
 }
 
 /// On its own, with other places and lights for each seed than anything else has.
-VerifiedError verified_error(const Surface& surface, const TransferOperator& transfer,
-                             const PrecomputeReport& report, const PrecomputeOptions& options) {
+Verification verify(const Surface& surface, const TransferOperator& transfer,
+                    const PrecomputeReport& report, const PrecomputeOptions& options) {
     VerificationOptions verification;
     verification.seed = hash64(options.seed, 0x7e41f);
     verification.most_rays = verification_rays(report);
-    return Verifier(surface, report.viewpoints, verification).error_of(transfer);
+    const Verifier verifier(surface, report.viewpoints, verification);
+    Verification result{verifier.error_of(transfer), {}};
+    if (result.error.any() && transfer.kind == OperatorKind::neumann) result.parts = verifier.parts_of(transfer, {});
+    return result;
 }
 
 Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
@@ -164,7 +182,7 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
 
 void print_results(const PrecomputeCommand& command, const TransferOperator& transfer,
                    const PrecomputeReport& report, const LinkCounts& links,
-                   const VerifiedError& verified, const OuterSeconds& outer) {
+                   const Verification& verified, const OuterSeconds& outer) {
     const auto say = [](const char* format, auto... values) {
         std::fprintf(stderr, format, values...);
     };
@@ -182,7 +200,8 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
         duration_text(outer.total).c_str());
-    if (verified.any()) say("verified error %s\n", verified.text().c_str());
+    if (verified.error.any()) say("verified error %s\n", verified.error.text().c_str());
+    if (verified.parts.any()) say("of which %s\n", verified.parts.text().c_str());
 }
 
 TransferOperator plain_transfer(const PrecomputeCommand& command, const Surface& surface,
@@ -253,8 +272,8 @@ void run(PrecomputeCommand& command) {
     const TransferOperator transfer = command.tuned ? tuned_transfer(command, surface, report, tuning)
                                                     : plain_transfer(command, surface, report);
     lap(time);
-    VerifiedError verified;
-    if (!command.no_verification) verified = verified_error(surface, transfer, report, command.options);
+    Verification verified;
+    if (!command.no_verification) verified = verify(surface, transfer, report, command.options);
     outer.verification = lap(time);
     const LinkCounts links(transfer);
     const Json options = options_json(command);
@@ -280,7 +299,7 @@ void run(PrecomputeCommand& command) {
     }
     if (command.run.quiet) return;
     print_results(command, transfer, report, links, verified, outer);
-    if (command.tuned) print_tuning(command, tuning, verified);
+    if (command.tuned) print_tuning(command, tuning, verified.error);
 }
 
 /// Turns what was typed into PrecomputeOptions; throws UsageError for what cannot be.

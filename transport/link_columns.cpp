@@ -16,7 +16,8 @@ std::uint32_t pack(Index receiver, std::uint32_t bits) {
     return static_cast<std::uint32_t>(receiver) | (bits >> 7) << 13;
 }
 Index receiver_of(std::uint32_t entry) { return entry & 8191u; }
-LinkVector vector_of(std::uint32_t entry) { return Links::vector_of((entry >> 13) << 7); }
+std::uint32_t bits_of(std::uint32_t entry) { return (entry >> 13) << 7; }
+LinkVector vector_of(std::uint32_t entry) { return Links::vector_of(bits_of(entry)); }
 
 } // namespace
 
@@ -56,17 +57,14 @@ LinkColumns::LinkColumns(const Links& links, Index senders)
 
 void LinkColumns::add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {
     parallel_for(blocks(), [&](Index block) {
-        Eigen::Vector4f* const first = &to[static_cast<std::size_t>(3 * block * block_size)];
-        for (const Change& change : changes) {
-            const Eigen::Vector4f c = change.coefficients;
+        float* const first = to[static_cast<std::size_t>(3 * block * block_size)].data();
+        for (const Change& change : changes)
             for (const std::uint32_t entry : segment(block, change.sender)) {
-                const LinkVector link = vector_of(entry);
-                Eigen::Vector4f* const f = first + 3 * receiver_of(entry);
-                f[0] += link.x() * c;
-                f[1] += link.y() * c;
-                f[2] += link.z() * c;
+                float* const at = first + 12 * receiver_of(entry);
+                LinkSum sum(at);
+                sum.add(bits_of(entry), change.coefficients.data());
+                sum.store(at);
             }
-        }
     }, 1);
 }
 

@@ -5,6 +5,7 @@
 #include "transport/positivity.h"
 
 #include <algorithm>
+#include <array>
 
 namespace afterglow {
 
@@ -63,18 +64,17 @@ VectorIrradiance LightTransport::apply_links(const std::vector<float>& coefficie
     parallel_for(
         receivers,
         [&](Index i) {
-            using Eigen::Vector4f;
-            Vector4f x = Vector4f::Zero(), y = Vector4f::Zero(), z = Vector4f::Zero();
-            transfer_.links.for_each(i, [&](std::uint32_t sender, const LinkVector& link) {
-                const auto e = Vector4f::Map(&coefficients[4 * static_cast<std::size_t>(sender)]);
-                x += link.x() * e;
-                y += link.y() * e;
-                z += link.z() * e;
-            });
-            float* to = &field[9 * static_cast<std::size_t>(i)];
-            std::copy_n(x.data(), 3, to);
-            std::copy_n(y.data(), 3, to + 3);
-            std::copy_n(z.data(), 3, to + 6);
+            LinkSum sum;
+            std::uint32_t sender = ~0u;
+            for (const PackedLink& packed : transfer_.links.row(i)) {
+                const std::uint32_t bits = Links::bits_of(packed);
+                sender += Links::step_of(bits);
+                sum.add(bits, &coefficients[4 * std::size_t{sender}]); // a jump's senders are there, too
+            }
+            std::array<float, 12> padded;
+            sum.store(padded.data());
+            for (std::size_t a = 0; a < 3; ++a)
+                std::copy_n(&padded[4 * a], 3, &field[9 * static_cast<std::size_t>(i) + 3 * a]);
         },
         256);
     transfer_.push.push(points, levels, 9, field);
@@ -140,6 +140,13 @@ VectorIrradiance LightTransport::apply_paper(const std::vector<float>& direct_ir
     return field;
 }
 
+Radiosity LightTransport::radiosity(const Spotlight& light, NeumannStatistics* statistics) const {
+    const Radiosity direct = direct_radiosity(light);
+    if (transfer_.bounces == 0) return all_bounces(direct, 2e-3, statistics);
+    if (statistics) *statistics = {.products = transfer_.bounces - 1};
+    return some_bounces(direct, transfer_.bounces);
+}
+
 VectorIrradiance LightTransport::indirect(const Spotlight& light,
                                           NeumannStatistics* statistics) const {
     if (transfer_.kind == OperatorKind::paper) {
@@ -152,15 +159,7 @@ VectorIrradiance LightTransport::indirect(const Spotlight& light,
             256);
         return apply_paper(e);
     }
-    const Radiosity direct = direct_radiosity(light);
-    Radiosity sum;
-    if (transfer_.bounces == 0) {
-        sum = all_bounces(direct, 2e-3, statistics);
-    } else {
-        sum = some_bounces(direct, transfer_.bounces);
-        if (statistics) *statistics = {.products = transfer_.bounces - 1};
-    }
-    VectorIrradiance field = gather(sum);
+    VectorIrradiance field = gather(radiosity(light, statistics));
     make_positive(transfer_.points, transfer_.push, field);
     return field;
 }

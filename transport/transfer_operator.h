@@ -95,6 +95,10 @@ public:
     /// T e pushed to every receiver: indirect vector irradiance at all points. Linear.
     VectorIrradiance gather(const Radiosity& radiosity) const;
 
+    /// What the senders radiate under a light after as many bounces as the operator says, direct light
+    /// included. Not of the paper's operator.
+    Radiosity radiosity(const Spotlight& light, NeumannStatistics* statistics = nullptr) const;
+
     /// Indirect vector irradiance at all points under a light, after as many bounces as the operator
     /// says. Of `neumann` it is nowhere below zero on the display level (make_positive()).
     VectorIrradiance indirect(const Spotlight& light, NeumannStatistics* statistics = nullptr) const;

@@ -15,7 +15,8 @@ namespace afterglow {
 std::uint64_t verification_rays(const PrecomputeReport& report);
 
 /// Lights differ, and the next three may be harder than most: their mean square is off by its standard error
-/// in one case of six. What a step's error counts as: itself, or that, of which a tenth above the target will do.
+/// in one case of six. What a step's error counts as: what is certain of it, or that, of which a fifth above
+/// the target will do.
 double cautious_error(const VerifiedError& error);
 
 struct TuningStep {
@@ -44,7 +45,7 @@ struct TuningReport {
 };
 
 /// Chooses the spacing of the functions by itself: a coarse precomputation is compared with the path
-/// tracer under two dozen random lights; error goes about like a power of the spacing, near one, so that
+/// tracer under 48 random lights; error goes about like a power of the spacing, near one, so that
 /// the next step's spacing follows; and so on until the target is met. Mostly two steps, of which the
 /// first takes a small part of the time. Other lights and places should tell how well it went, as the
 /// steps were chosen by these. Above 10 %, what is dropped of links follows the target too

@@ -3,6 +3,7 @@
 #include "basis/candidates.h"
 #include "core/sampling.h"
 #include "transport/display.h"
+#include "transport/error_parts.h"
 #include "transport/transfer_operator.h"
 
 #include <algorithm>
@@ -88,15 +89,14 @@ Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, 
                    std::uint64_t seed) {
     FreePlaces free(surface, viewpoints, seed);
     Trial trial;
-    std::vector<Vec3> eyes;
     for (int l = 0; l < lights; ++l) {
         trial.lights.push_back(random_spotlight(surface, free));
-        eyes.push_back(trial.lights.back().position);
-        eyes.push_back(free.next());
+        trial.eyes.push_back(trial.lights.back().position);
+        trial.eyes.push_back(free.next());
     }
     for (std::uint32_t k = 0; static_cast<int>(trial.places.size()) < places; ++k) {
         if (k >= 100u * static_cast<std::uint32_t>(places)) return {};
-        const Vec3& eye = eyes[k % eyes.size()];
+        const Vec3& eye = trial.eyes[k % trial.eyes.size()];
         const Vec3 direction = sample_sphere(scrambled_sobol2(k, hash64(seed, 0x9147)));
         if (const Hit hit = surface.closest_hit({eye, direction})) trial.places.push_back(surface.point(hit));
     }
@@ -148,54 +148,73 @@ VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::
 
 Verifier::Verifier(const Surface& surface, const std::vector<Vec3>& viewpoints,
                    const VerificationOptions& options)
-    : surface_(surface),
-      trial_(random_trial(surface, viewpoints, options.lights, options.places, options.seed)) {
-    if (trial_.places.empty()) return;
+    : surface_(surface) {
     constexpr double rays_of_path = 40.0; // shadow rays and connections to three lights included
-    PathTracerOptions tracer;
-    tracer.strategy = PathStrategy::connected;
-    tracer.seed = options.seed;
-    tracer.target_error = options.reference_error;
-    tracer.max_samples = std::max<Index>(
-        tracer.batches, static_cast<Index>(static_cast<double>(options.most_rays) / (rays_of_path * options.places)));
-    reference_ = estimate_irradiance(surface, trial_.lights, trial_.places, tracer);
+    for (int t = 0; t < options.trials; ++t) {
+        PathTracerOptions tracer;
+        tracer.seed = t == 0 ? options.seed : hash64(options.seed, static_cast<std::uint64_t>(t));
+        Trial trial = random_trial(surface, viewpoints, options.lights, options.places, tracer.seed);
+        if (trial.places.empty()) continue;
+        tracer.strategy = PathStrategy::connected;
+        tracer.target_error = options.reference_error;
+        tracer.max_samples =
+            std::max<Index>(tracer.batches, static_cast<Index>(static_cast<double>(options.most_rays)
+                                                               / (rays_of_path * options.places * options.trials)));
+        references_.push_back(estimate_irradiance(surface, trial.lights, trial.places, tracer));
+        trials_.push_back(std::move(trial));
+    }
 }
 
 VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
-    if (trial_.places.empty()) return {};
+    if (trials_.empty()) return {};
     const LightTransport transport(transfer, surface_);
     const Display display(transfer, surface_);
-    const auto lights = static_cast<Index>(trial_.lights.size());
-    const auto places = static_cast<Index>(trial_.places.size());
     VerifiedError all;
-    double squares = 0.0, fourths = 0.0, variance = 0.0; // the last of the sum of squares
+    double squares = 0.0, variance = 0.0; // the latter of the former
+    double certain_squares = 0.0, certain_fourths = 0.0;
     int lit = 0;
-    for (Index l = 0; l < lights; ++l) {
-        const auto of_light = Eigen::seqN(l, places, lights);
-        const Eigen::Array3Xf indirect = reference_.indirect(Eigen::all, of_light);
-        if (!(indirect > 0.0f).any()) continue; // a light that shines out of the scene
-        const Spotlight& light = trial_.lights[static_cast<std::size_t>(l)];
-        const Eigen::Array3Xf found = display.irradiance(trial_.places, transport.indirect(light), light);
-        const VerifiedError error =
-            compare_with_reference(found, indirect, reference_.standard_error(Eigen::all, of_light));
-        ++lit;
-        squares += error.rel_rmse * error.rel_rmse;
-        fourths += std::pow(error.rel_rmse, 4);
-        variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);
-        if (!all.any() || error.rel_rmse > all.worst) {
-            all.worst = error.rel_rmse;
-            all.bias = error.bias;
-            all.reference_error = error.reference_error;
+    for (std::size_t t = 0; t < trials_.size(); ++t) {
+        const Trial& trial = trials_[t];
+        const auto lights = static_cast<Index>(trial.lights.size());
+        const auto places = static_cast<Index>(trial.places.size());
+        all.lights += static_cast<int>(lights);
+        bool shows = false; // any light
+        for (Index l = 0; l < lights; ++l) {
+            const auto of_light = Eigen::seqN(l, places, lights);
+            const Eigen::Array3Xf indirect = references_[t].indirect(Eigen::all, of_light);
+            if (!(indirect > 0.0f).any()) continue; // a light that shines out of the scene
+            const Spotlight& light = trial.lights[static_cast<std::size_t>(l)];
+            const Eigen::Array3Xf found = display.irradiance(trial.places, transport.indirect(light), light);
+            const VerifiedError error =
+                compare_with_reference(found, indirect, references_[t].standard_error(Eigen::all, of_light));
+            ++lit;
+            shows = true;
+            squares += error.rel_rmse * error.rel_rmse;
+            const double certain =
+                error.rel_rmse - std::clamp(error.standard_error - 0.2 * error.rel_rmse, 0.0, error.rel_rmse);
+            certain_squares += certain * certain;
+            certain_fourths += std::pow(certain, 4);
+            variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);
+            if (lit == 1 || error.rel_rmse > all.worst) {
+                all.worst = error.rel_rmse;
+                all.worst_light = all.lights - static_cast<int>(lights) + static_cast<int>(l);
+                all.bias = error.bias;
+                all.reference_error = error.reference_error;
+            }
         }
-        all.places = error.places;
+        if (shows) all.places += static_cast<int>(places);
     }
     if (lit == 0) return {};
-    all.lights = static_cast<int>(lights);
     all.rel_rmse = std::sqrt(squares / lit);
+    all.certain = std::sqrt(certain_squares / lit);
     if (lit > 1)
-        all.spread = std::sqrt(std::max(0.0, fourths / lit - std::pow(squares / lit, 2)) * lit / (lit - 1.0));
+        all.spread = std::sqrt(std::max(0.0, certain_fourths / lit - std::pow(all.certain, 4)) * lit / (lit - 1.0));
     if (all.rel_rmse > 0.0) all.standard_error = std::sqrt(variance) / lit / (2.0 * all.rel_rmse);
     return all;
+}
+
+ErrorParts Verifier::parts_of(const TransferOperator& transfer, const ErrorPartsOptions& options) const {
+    return error_parts(surface_, transfer, trials_.front(), references_.front(), options);
 }
 
 } // namespace afterglow

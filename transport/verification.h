@@ -14,7 +14,8 @@ namespace afterglow {
 /// Lights and places as a person may choose them, to try an operator on.
 struct Trial {
     std::vector<Spotlight> lights;
-    std::vector<SurfacePoint> places;
+    std::vector<Vec3> eyes; // two a light: where it is, and another place in the open
+    std::vector<SurfacePoint> places; // in sight of the eyes
 };
 
 /// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the
@@ -25,8 +26,9 @@ Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, 
                    std::uint64_t seed);
 
 struct VerificationOptions {
-    int lights = 3;
-    int places = 1000;
+    int trials = 1;    // each with lights and places of its own
+    int lights = 3;    // a trial
+    int places = 1000; // a trial
     double reference_error = 0.03;        // relative, that the path tracer shall reach
     std::uint64_t most_rays = 10'000'000; // that it takes, about
     std::uint64_t seed = 1;
@@ -38,29 +40,38 @@ struct VerifiedError {
                                  // relRMSE, the path tracer's own variance taken out
     double standard_error = 0.0; // of rel_rmse, over the choice of places (jackknife of 20 groups)
     double worst = 0.0;          // relRMSE under the light that has the largest
-    double spread = 0.0;         // standard deviation over the lights of the squared relRMSE
+    int worst_light = 0;         // its number, those of the first trial first
+    double certain = 0.0;        // as rel_rmse, of each light's relRMSE less by what its standard error
+                                 // exceeds a fifth of it: where single places decide, without them
+    double spread = 0.0;         // standard deviation over the lights of the squares of these
     double bias = 0.0;           // mean error over mean, under that light
     double reference_error = 0.0; // there
-    int lights = 0, places = 0;
+    int lights = 0, places = 0; // of all trials
     bool any() const { return places > 0; }
     /// For a person, in one line.
     std::string text() const;
 };
 
-/// A trial, and what the path tracer says of it: to try several operators of one scene on.
+struct ErrorParts;
+struct ErrorPartsOptions;
+
+/// Trials, and what the path tracer says of them: to try several operators of one scene on.
 class Verifier {
 public:
     /// Lights and places depend on the seed and the scene alone. Keeps a reference to the surface.
     Verifier(const Surface& surface, const std::vector<Vec3>& viewpoints,
              const VerificationOptions& options);
-    const Trial& trial() const { return trial_; }
+    /// Those in which anything is in sight.
+    const std::vector<Trial>& trials() const { return trials_; }
     /// Nothing (any() is false) where hardly anything is in sight.
     VerifiedError error_of(const TransferOperator& transfer) const;
+    /// Under the first trial; of one that is not empty. Not of the paper's operator.
+    ErrorParts parts_of(const TransferOperator& transfer, const ErrorPartsOptions& options) const;
 
 private:
     const Surface& surface_;
-    Trial trial_;
-    IrradianceEstimate reference_; // none without places
+    std::vector<Trial> trials_;
+    std::vector<IrradianceEstimate> references_; // a trial each
 };
 
 /// The same for one light of a trial, of which the reference is known: 3 x places each [W/m^2].
