@@ -190,8 +190,7 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
             ++lit;
             shows = true;
             squares += error.rel_rmse * error.rel_rmse;
-            const double certain =
-                error.rel_rmse - std::clamp(error.standard_error - 0.2 * error.rel_rmse, 0.0, error.rel_rmse);
+            const double certain = std::clamp((error.rel_rmse - error.standard_error) / 0.8, 0.0, error.rel_rmse);
             certain_squares += certain * certain;
             certain_fourths += std::pow(certain, 4);
             variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);

@@ -3,6 +3,7 @@
 #include "core/peak_memory.h"
 #include "core/sampling.h"
 #include "core/seconds.h"
+#include "tests/bench/lookup.h"
 #include "transport/moving_light.h"
 #include "transport/precompute.h"
 #include "transport/transfer_file.h"
@@ -20,7 +21,7 @@
 #include <vector>
 
 // Speed beside what it is made of, in one run, by hand: `precompute` against Embree alone with the same
-// rays, `update` of a moving light against reading its operator once.
+// rays, `update` of a moving light against reading its operator once, `lookup` of functions in three ways.
 
 namespace afterglow {
 namespace {
@@ -264,6 +265,10 @@ int main(int argc, char** argv) {
         "--from", [&](const std::vector<float>& p) { options.from = {p[0], p[1], p[2]}; },
         "Where the light starts (default 0 9 0, Sponza's nave)")->expected(3);
     update->callback([&] { afterglow::run_update(options); });
+    std::string scene;
+    CLI::App* lookup = app.add_subcommand("lookup", "Functions where rays end: R-tree, hash grid, patch");
+    lookup->add_option("scene", scene, "OBJ file or builtin:NAME")->required();
+    lookup->callback([&] { afterglow::run_lookup(scene); });
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
