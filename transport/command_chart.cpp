@@ -146,21 +146,31 @@ private:
     Json head_, runs_ = Json::array();
 };
 
-/// Errors that depend on R_0 alone need the points of "spacing", which come first.
+/// Whether a setting is meant by "SWEEP" or "SWEEP=VALUE".
+bool is_meant(const ChartSetting& setting, const std::string& by) {
+    const std::size_t equals = by.find('=');
+    return setting.sweep == by.substr(0, equals)
+           && (equals == std::string::npos
+               || static_cast<float>(setting.value) == parse_numbers("--sweeps", by.substr(equals + 1), 1)[0]);
+}
+
+/// Those that are asked for; with the first one before any that is relative to the radius it tells.
 std::vector<ChartSetting> wanted_settings(const ChartCommand& command) {
     std::vector<ChartSetting> settings = chart_settings(command.brief, command.run.seed);
     for (const std::string& sweep : command.sweeps)
-        if (std::none_of(settings.begin(), settings.end(), [&](const ChartSetting& s) { return s.sweep == sweep; }))
+        if (std::none_of(settings.begin(), settings.end(), [&](const ChartSetting& s) { return is_meant(s, sweep); }))
             throw UsageError("--sweeps knows no '" + sweep + "'" + (command.brief ? " with --brief" : ""));
-    const auto is_wanted = [&](const std::string& sweep) {
-        return command.sweeps.empty() || std::count(command.sweeps.begin(), command.sweeps.end(), sweep) > 0;
+    const auto is_wanted = [&](const ChartSetting& setting) {
+        return command.sweeps.empty()
+               || std::any_of(command.sweeps.begin(), command.sweeps.end(),
+                              [&](const std::string& sweep) { return is_meant(setting, sweep); });
     };
     const bool by_radius = std::any_of(settings.begin(), settings.end(), [&](const ChartSetting& s) {
-        return s.radius_share > 0.0f && is_wanted(s.sweep);
+        return s.radius_share > 0.0f && is_wanted(s);
     });
     std::erase_if(settings, [&, first = true](const ChartSetting& s) mutable {
         const bool tells_radius = std::exchange(first, false) && by_radius;
-        return !is_wanted(s.sweep) && !tells_radius;
+        return !is_wanted(s) && !tells_radius;
     });
     return settings;
 }
@@ -237,8 +247,8 @@ void add_chart_command(CLI::App& app) {
                     "Folder; what is measured there already is not measured again")->required();
     sub->add_flag("--brief", command->brief, "A few coarse points alone, in seconds");
     sub->add_option("--sweeps", command->sweeps,
-                    "Some of them alone: spacing, target, path, paper, dense, flat, rays, receiver_levels, "
-                    "sender_levels, threshold, bounces")
+                    "Some of them alone, or a value of one (target=0.1): spacing, target, path, paper, dense, flat, "
+                    "rays, receiver_levels, sender_levels, threshold, bounces")
         ->delimiter(',');
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);

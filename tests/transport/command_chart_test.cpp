@@ -56,6 +56,24 @@ TEST(CommandChart, MeasuresDrawsAndGoesOnWhereItWas) {
     EXPECT_NE(damaged.err.find("runs.json"), std::string::npos) << damaged.err;
 }
 
+TEST(CommandChart, MeasuresSomeSweepsAlone) {
+    const TemporaryFolder folder;
+    const std::string start = "chart builtin:cornell -o '" + folder.path("c") + "' --sweeps ";
+    const Outcome made = run(start + "path=4,target=0.3");
+    ASSERT_EQ(made.status, 0) << made.err;
+    const nlohmann::json points = nlohmann::json::parse(content_of(folder.path("c/runs.json")))["runs"];
+    ASSERT_EQ(points.size(), 2u);
+    EXPECT_EQ(points[0]["sweep"], "target");
+    EXPECT_EQ(points[0]["value"], 0.3);
+    EXPECT_EQ(points[1]["sweep"], "path");
+    EXPECT_EQ(points[1]["value"], 4.0);
+    EXPECT_FALSE(std::filesystem::exists(folder.path("c/map_builtin_cornell.json")));
+
+    EXPECT_EQ(run(start + "dance").status, 2);
+    EXPECT_EQ(run(start + "target=0.31").status, 2);
+    EXPECT_EQ(run(start + "target=much").status, 2);
+}
+
 TEST(CommandChart, NeedsAFolderItCanWriteTo) {
     EXPECT_EQ(run("chart builtin:cornell --brief -o /proc/none").status, 1);
     EXPECT_EQ(run("chart --brief -o /tmp").status, 2);
