@@ -20,7 +20,7 @@ constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
 
 /// Times those of the verification, as sixteen times its lights and twice its places are compared.
-constexpr std::uint64_t search_rays = 4;
+constexpr std::uint64_t search_rays = 3;
 
 /// Of spacings: where a single place decides, less may do than it seems; and a step that costs less than half as
 /// much again as the last is not worth it.
@@ -71,7 +71,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
                                 {.trials = 16,
                                  .lights = 3,
                                  .places = 125,
-                                 .reference_error = 0.03,
+                                 .reference_error = 0.5 * tuning.target_error, // its noise is taken out
                                  .most_rays = search_rays * verification_rays(report),
                                  .seed = hash64(options.seed, 0x7a5e)});
         result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
