@@ -20,8 +20,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 VerificationOptions trial_options(std::uint64_t seed) {
-    return {.lights = chart_lights,
-            .places = chart_places,
+    return {.trials = chart_trials,
+            .lights = chart_lights / chart_trials,
+            .places = chart_places / chart_trials,
             .reference_error = 0.02,
             .most_rays = 400'000'000,
             .seed = hash64(seed, 0xc4a87)};
@@ -89,7 +90,6 @@ ChartBench::ChartBench(const Surface& surface, std::string folder, std::uint64_t
 }
 
 ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
-    const Trial& trial = verifier_.trials().front();
     ChartPoint point;
     point.sweep = setting.sweep;
     point.value = setting.value;
@@ -99,17 +99,22 @@ ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
     tracer.batches = static_cast<int>(std::min<Index>(16, setting.path_samples));
     tracer.seed = hash64(seed_, 0x9a7b);
     double squares = 0.0;
-    for (const Spotlight& light : trial.lights) {
-        const auto start = Clock::now();
-        const IrradianceEstimate estimate = estimate_irradiance(surface_, {&light, 1}, trial.places, tracer);
-        point.seconds += seconds_since(start) / chart_lights;
-        point.rays += estimate.rays;
-        squares += estimate.relative_error[0] * estimate.relative_error[0] / chart_lights;
-        point.error.worst = std::max(point.error.worst, estimate.relative_error[0]);
-    }
+    double traced = 0.0; // places, once a light
+    int lights = 0;
+    for (const Trial& trial : verifier_.trials())
+        for (const Spotlight& light : trial.lights) {
+            const auto start = Clock::now();
+            const IrradianceEstimate estimate = estimate_irradiance(surface_, {&light, 1}, trial.places, tracer);
+            point.seconds += seconds_since(start);
+            point.rays += estimate.rays;
+            squares += estimate.relative_error[0] * estimate.relative_error[0];
+            point.error.worst = std::max(point.error.worst, estimate.relative_error[0]);
+            traced += static_cast<double>(trial.places.size());
+            ++lights;
+        }
     constexpr double pixels = 1280.0 * 720.0;
-    point.seconds *= pixels / static_cast<double>(trial.places.size());
-    point.error.rel_rmse = std::sqrt(squares);
+    point.seconds *= pixels / traced;
+    point.error.rel_rmse = std::sqrt(squares / lights);
     point.error.lights = chart_lights;
     point.error.places = chart_places;
     return point;
@@ -156,7 +161,7 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
         point.update_seconds = std::min(point.update_seconds, seconds_since(begin));
     }
     point.error = verifier_.error_of(transfer);
-    if (setting.sweep == "spacing") point.parts = verifier_.parts_of(transfer, {.places = chart_places, .rays = 2048});
+    if (setting.sweep == "spacing") point.parts = verifier_.parts_of(transfer, {.places = chart_places / chart_trials, .rays = 2048});
     return point;
 }
 
@@ -164,8 +169,10 @@ ErrorMap ChartBench::error_map() const {
     PrecomputeOptions options;
     options.seed = seed_;
     const TransferOperator transfer = precompute(surface_, options);
-    const Trial& trial = verifier_.trials().front();
-    const auto hardest = static_cast<std::size_t>(verifier_.error_of(transfer).worst_light);
+    const auto worst = static_cast<std::size_t>(verifier_.error_of(transfer).worst_light);
+    const std::size_t lights_of_trial = verifier_.trials().front().lights.size();
+    const Trial& trial = verifier_.trials()[worst / lights_of_trial];
+    const std::size_t hardest = worst % lights_of_trial;
     const Spotlight& light = trial.lights[hardest];
     const Hit lit = surface_.closest_hit({light.position, light.direction});
     Camera camera{.position = trial.eyes[2 * hardest + 1], .vertical_fov = 60.0f, .width = 192, .height = 108};

@@ -12,8 +12,8 @@
 
 namespace afterglow {
 
-/// Of the trial that all points of a scene share.
-inline constexpr int chart_lights = 3, chart_places = 1000;
+/// Of the trials that all points of a scene share: so many times three lights, with places of their own.
+inline constexpr int chart_trials = 4, chart_lights = 3 * chart_trials, chart_places = 1000;
 
 /// One way to precompute a scene (or to trace its paths), and what came of it: a point of a chart.
 struct ChartPoint {
@@ -55,7 +55,7 @@ struct ChartSetting {
 /// `brief`: a few coarse points of spacing, target, path and paper.
 std::vector<ChartSetting> chart_settings(bool brief, std::uint64_t seed);
 
-/// A picture of an operator's error: seen from an open place, what the trial's hardest light lights.
+/// A picture of an operator's error: seen from an open place, what the hardest of the trials' lights lights.
 struct ErrorMap {
     int width = 0, height = 0;
     double rel_rmse = 0.0, reference_error = 0.0; // of the picture

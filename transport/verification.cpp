@@ -213,7 +213,19 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
 }
 
 ErrorParts Verifier::parts_of(const TransferOperator& transfer, const ErrorPartsOptions& options) const {
-    return error_parts(surface_, transfer, trials_.front(), references_.front(), options);
+    std::vector<ErrorParts> parts;
+    for (std::size_t t = 0; t < trials_.size(); ++t)
+        parts.push_back(error_parts(surface_, transfer, trials_[t], references_[t], options));
+    const auto mean = [&](ErrorPart ErrorParts::*part) {
+        double square = 0.0, variance = 0.0; // the latter of the former
+        for (const ErrorParts& p : parts) {
+            square += std::pow((p.*part).rms, 2) / static_cast<double>(parts.size());
+            variance += std::pow(2.0 * (p.*part).rms * (p.*part).standard_error / static_cast<double>(parts.size()), 2);
+        }
+        const double rms = std::sqrt(square);
+        return ErrorPart{rms, rms > 0.0 ? std::sqrt(variance) / (2.0 * rms) : 0.0};
+    };
+    return {mean(&ErrorParts::senders), mean(&ErrorParts::links), mean(&ErrorParts::receivers)};
 }
 
 } // namespace afterglow

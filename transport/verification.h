@@ -65,7 +65,7 @@ public:
     const std::vector<Trial>& trials() const { return trials_; }
     /// Nothing (any() is false) where hardly anything is in sight.
     VerifiedError error_of(const TransferOperator& transfer) const;
-    /// Under the first trial; of one that is not empty. Not of the paper's operator.
+    /// Mean squares over the trials, of which there must be one. Not of the paper's operator.
     ErrorParts parts_of(const TransferOperator& transfer, const ErrorPartsOptions& options) const;
 
 private:
