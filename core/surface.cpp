@@ -1,10 +1,9 @@
 #include "core/surface.h"
 
+#include "core/embree.h"
 #include "core/error.h"
 #include "core/normal_map.h"
 #include "core/parallel.h"
-
-#include <embree3/rtcore.h>
 
 #include <algorithm>
 #include <array>
@@ -119,9 +118,7 @@ Hit Surface::closest_hit(const Ray& ray) const {
     RTCRayHit query{};
     query.ray = to_embree(ray);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcIntersect1(tree_->scene, &context, &query);
+    embree_intersect(tree_->scene, query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
     const float facing = query.hit.Ng_x * ray.direction.x() + query.hit.Ng_y * ray.direction.y()
                          + query.hit.Ng_z * ray.direction.z();
@@ -131,8 +128,6 @@ Hit Surface::closest_hit(const Ray& ray) const {
 }
 
 void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     alignas(32) int valid[packet_width];
     alignas(32) RTCRayHit8 packet;
     for (std::size_t begin = 0; begin < rays.size(); begin += packet_width) {
@@ -142,7 +137,7 @@ void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const
             put(packet.ray, k, rays[begin + std::min(k, count - 1)]);
             packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
         }
-        rtcIntersect8(valid, tree_->scene, &context, &packet);
+        embree_intersect(valid, tree_->scene, packet);
         for (std::size_t k = 0; k < count; ++k) {
             Hit& hit = hits[begin + k];
             if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {
@@ -163,9 +158,7 @@ void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const
 
 bool Surface::occluded(const Ray& ray) const {
     RTCRay query = to_embree(ray);
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    rtcOccluded1(tree_->scene, &context, &query);
+    embree_occluded(tree_->scene, query);
     return query.tfar < 0.0f;
 }
 
@@ -178,8 +171,6 @@ bool Surface::blocked(const Vec3& from, const Vec3& to) const {
 
 void Surface::blocked(std::span<const Vec3> from, std::span<const Vec3> to,
                       std::span<std::uint8_t> result) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     alignas(32) int valid[packet_width];
     alignas(32) RTCRay8 packet;
     for (std::size_t begin = 0; begin < from.size(); begin += packet_width) {
@@ -191,7 +182,7 @@ void Surface::blocked(std::span<const Vec3> from, std::span<const Vec3> to,
             valid[k] = k < count && length > 0.0f ? -1 : 0;
             put(packet, k, {from[i], step / length, length});
         }
-        rtcOccluded8(valid, tree_->scene, &context, &packet);
+        embree_occluded(valid, tree_->scene, packet);
         for (std::size_t k = 0; k < count; ++k) result[begin + k] = valid[k] != 0 && packet.tfar[k] < 0.0f;
     }
 }

@@ -14,8 +14,9 @@ FOLDERS = {
     "viewer": {"core", "basis", "transport", "viewer"},
 }
 ANYWHERE = r"Eigen/|[a-z_]+$|sys/\w+\.h$|(fcntl|immintrin|spawn|unistd)\.h$"  # and the standard library
+PRIVATE = {"core/embree.h": {"core/surface.cpp"}}  # headers that show a library -> who may include them
 LIBRARIES = {  # how the included path starts -> the files, or folders' .cpp files, that may name it
-    r"embree3/": {"core/surface.cpp"},
+    r"embree[34]/": {"core/embree.h"},
     r"OpenEXR/|Imf|Imath|Iex|half\.h": {"core/image.cpp"},
     r"stb/|stb_": {"core/image.cpp", "core/obj_loader.cpp"},
     r"tiny_obj_loader": {"core/obj_loader.cpp"},
@@ -43,6 +44,8 @@ def complaints(root):
 
 
 def is_allowed(name, folders, quote, path):
+    if path in PRIVATE:
+        return name in PRIVATE[path]
     if quote == '"':
         return path.split("/")[0] in folders
     for library, files in LIBRARIES.items():

@@ -242,9 +242,9 @@ void add_chart_command(CLI::App& app) {
     CLI::App* sub = app.add_subcommand(
         "chart", "Sweeps over settings: error against time and bytes, measured and drawn");
     const auto command = std::make_shared<ChartCommand>();
-    sub->add_option("scenes", command->scenes, "Wavefront OBJ files or builtin:NAME")->required();
+    sub->add_option("scenes", command->scenes, "Wavefront OBJ files or builtin:NAME")->required()->type_name("SCENE");
     sub->add_option("-o,--output", command->output,
-                    "Folder; what is measured there already is not measured again")->required();
+                    "Folder; what is measured there already is not measured again")->required()->type_name("FOLDER");
     sub->add_flag("--brief", command->brief, "A few coarse points alone, in seconds");
     sub->add_option("--sweeps", command->sweeps,
                     "Some of them alone, or a value of one (target=0.1): spacing, target, path, paper, dense, flat, "

@@ -89,9 +89,11 @@ void add_compare_command(CLI::App& app) {
         app.add_subcommand("compare", "How far a picture or CSV file is from a reference");
     const auto command = std::make_shared<CompareCommand>();
     sub->add_option("a", command->picture, "What is measured (EXR, or CSV of E_r,E_g,E_b)")
-        ->required();
+        ->required()
+        ->type_name("FILE");
     sub->add_option("b", command->reference, "The reference, of the same kind and size")
-        ->required();
+        ->required()
+        ->type_name("FILE");
     sub->add_flag("--json", command->json, "One line of JSON");
     sub->callback([command] { run(*command); });
 }

@@ -105,7 +105,7 @@ void print_text(const TransferFile& file) {
 void add_info_command(CLI::App& app) {
     CLI::App* sub = app.add_subcommand("info", "What a transfer file holds");
     const auto command = std::make_shared<InfoCommand>();
-    sub->add_option("file", command->file, "Transfer file")->required();
+    sub->add_option("file", command->file, "Transfer file")->required()->type_name("FILE");
     sub->add_flag("--json", command->json, "One JSON object instead of text");
     sub->callback([command] {
         const TransferFile file = load_transfer(command->file);

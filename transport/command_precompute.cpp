@@ -355,8 +355,8 @@ void add_precompute_command(CLI::App& app) {
     CLI::App* sub =
         app.add_subcommand("precompute", "Computes the transfer file of a scene: the slow step");
     const auto command = std::make_shared<PrecomputeCommand>();
-    sub->add_option("scene", command->scene, "Wavefront OBJ file or builtin:NAME")->required();
-    sub->add_option("-o,--output", command->output, "Transfer file")->required();
+    sub->add_option("scene", command->scene, "Wavefront OBJ file or builtin:NAME")->required()->type_name("SCENE");
+    sub->add_option("-o,--output", command->output, "Transfer file")->required()->type_name("FILE");
     CLI::Option* target_error =
         add_number(*sub, "--target-error", command->target_error,
                    "Relative error of the indirect irradiance to aim at: the spacing follows, by steps "
@@ -371,7 +371,8 @@ void add_precompute_command(CLI::App& app) {
         ->excludes(target_error);
     sub->add_option("--operator", command->operator_name,
                     "neumann: one bounce, repeated at run time (default); paper: several bounces, "
-                    "stored, as Lehtinen et al. printed it");
+                    "stored, as Lehtinen et al. printed it")
+        ->type_name("neumann|paper");
     sub->add_option_function<std::string>(
            "--viewpoint",
            [command](const std::string& text) {
@@ -395,7 +396,7 @@ void add_precompute_command(CLI::App& app) {
         ->check(CLI::Range(0, most_bounces));
     sub->add_flag("--no-verification", command->no_verification,
                   "Do not compare with the path tracer in the end");
-    sub->add_option("--report", command->report, "JSON file for counts and times");
+    sub->add_option("--report", command->report, "JSON file for counts and times")->type_name("FILE");
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);
     sub->callback([sub, command] {

@@ -44,10 +44,10 @@ void add_query_command(CLI::App& app) {
     CLI::App* sub =
         app.add_subcommand("query", "Indirect irradiance at points, from a transfer file");
     const auto command = std::make_shared<QueryCommand>();
-    sub->add_option("file", command->file, "Transfer file")->required();
-    sub->add_option("--points", command->points, "CSV file of x,y,z,nx,ny,nz")->required();
-    sub->add_option("-o,--output", command->output, "CSV file of E_r,E_g,E_b")->required();
-    sub->add_option("--scene", command->scene, "Where the scene is now");
+    sub->add_option("file", command->file, "Transfer file")->required()->type_name("FILE");
+    sub->add_option("--points", command->points, "CSV file of x,y,z,nx,ny,nz")->required()->type_name("FILE");
+    sub->add_option("-o,--output", command->output, "CSV file of E_r,E_g,E_b")->required()->type_name("FILE");
+    sub->add_option("--scene", command->scene, "Where the scene is now")->type_name("SCENE");
     add_light_options(*sub, command->light);
     add_run_options(*sub, command->run);
     sub->callback([command] { run(*command); });

@@ -126,17 +126,19 @@ void add_reference_command(CLI::App& app) {
     CLI::App* sub = app.add_subcommand(
         "reference", "Indirect light by unbiased path tracing: a picture, or irradiance at points");
     const auto command = std::make_shared<ReferenceCommand>();
-    sub->add_option("scene", command->scene, "Wavefront OBJ file or builtin:NAME")->required();
+    sub->add_option("scene", command->scene, "Wavefront OBJ file or builtin:NAME")->required()->type_name("SCENE");
     sub->add_option("-o,--output", command->output,
                     "Picture (.exr, .png), or CSV file with --points")
-        ->required();
+        ->required()
+        ->type_name("FILE");
     CLI::Option* points =
         sub->add_option("--points", command->points,
                         "CSV file of x,y,z,nx,ny,nz: writes the indirect irradiance "
-                        "at each as E_r,E_g,E_b");
+                        "at each as E_r,E_g,E_b")->type_name("FILE");
     sub->add_option(
            "--layer", command->layer,
            "direct, indirect (radiance to the camera), full or irradiance (default indirect)")
+        ->type_name("direct|indirect|full|irradiance")
         ->excludes(points);
     CLI::Option* samples =
         sub->add_option("--spp", command->samples, "Paths a pixel or point (default 256)")
@@ -147,8 +149,9 @@ void add_reference_command(CLI::App& app) {
     sub->add_option(
         "--strategy", command->strategy,
         "plain, or connected: also joins paths to rays from the light, less noise a path for "
-        "more time (default plain)");
-    sub->add_option("--report", command->report, "JSON file for samples, rays, time and error");
+        "more time (default plain)")
+        ->type_name("plain|connected");
+    sub->add_option("--report", command->report, "JSON file for samples, rays, time and error")->type_name("FILE");
     add_light_options(*sub, command->light);
     add_camera_options(*sub, command->camera);
     add_run_options(*sub, command->run);

@@ -86,11 +86,12 @@ void run(RenderCommand& command) {
 void add_render_command(CLI::App& app) {
     CLI::App* sub = app.add_subcommand("render", "A picture from a transfer file, under any light");
     const auto command = std::make_shared<RenderCommand>();
-    sub->add_option("file", command->file, "Transfer file")->required();
-    sub->add_option("-o,--output", command->output, "Picture (.exr, .png)")->required();
+    sub->add_option("file", command->file, "Transfer file")->required()->type_name("FILE");
+    sub->add_option("-o,--output", command->output, "Picture (.exr, .png)")->required()->type_name("FILE");
     sub->add_option(
         "--layer", command->layer,
-        "direct, indirect (radiance to the camera), full or irradiance (default indirect)");
+        "direct, indirect (radiance to the camera), full or irradiance (default indirect)")
+        ->type_name("direct|indirect|full|irradiance");
     sub->add_option("--samples", command->samples, "Samples a pixel (default 4)")
         ->check(CLI::Range(1, 4096));
     sub->add_option("--gap-paths", command->gap_paths,
@@ -98,7 +99,7 @@ void add_render_command(CLI::App& app) {
         ->check(CLI::Range(0, 65536));
     add_number(*sub, "--exposure", command->exposure,
                "Key of the tone map, for .png alone (default 0.18)");
-    sub->add_option("--scene", command->scene, "Where the scene is now");
+    sub->add_option("--scene", command->scene, "Where the scene is now")->type_name("SCENE");
     add_light_options(*sub, command->light);
     add_camera_options(*sub, command->camera);
     add_run_options(*sub, command->run);

@@ -6,15 +6,32 @@
 #include "transport/command_query.h"
 #include "transport/command_reference.h"
 #include "transport/command_render.h"
+#include "transport/manual.h"
+#include "transport/processor.h"
 
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <exception>
 
+namespace {
+
+const afterglow::ManualText manual = {
+    .description =
+        "Computes the indirect light of a static scene ahead of time, so that it can be had in an instant for any "
+        "light and from any viewpoint: precompute makes the transfer file of a scene, render and query take the "
+        "light from it. reference, compare and chart say how far the result is from the truth.\n\n"
+        "Results go to standard output or to the files named, progress and errors to standard error. Files appear "
+        "whole or not at all. The same input, options and seed give the same bytes on any number of threads.",
+    .see_also = "afterglow-view(1)"};
+
+} // namespace
+
 int main(int argc, char** argv) {
+    afterglow::run_faster_twin(argv);
     CLI::App app("Precomputed direct-to-indirect light transport", "afterglow");
     app.set_version_flag("--version", AFTERGLOW_VERSION);
+    afterglow::add_manual_options(app, manual);
     app.require_subcommand(1);
     afterglow::add_precompute_command(app);
     afterglow::add_render_command(app);

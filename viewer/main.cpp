@@ -1,6 +1,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "transport/cli_options.h"
+#include "transport/manual.h"
+#include "transport/processor.h"
 #include "viewer/headless.h"
 #include "viewer/viewer_app.h"
 
@@ -13,6 +15,12 @@ namespace {
 
 using namespace afterglow;
 
+const ManualText manual = {
+    .description =
+        "Shows a transfer file that afterglow precompute has made, with a light and a camera that can be moved: in "
+        "a window, or without one, for the frames of a path.",
+    .see_also = "afterglow(1)"};
+
 struct ViewCommand {
     std::string file, scene, layer = "full", method = "auto";
     bool headless = false;
@@ -23,11 +31,14 @@ struct ViewCommand {
 };
 
 void add_options(CLI::App& app, ViewCommand& command) {
-    app.add_option("file", command.file, "Transfer file; in a window also a scene (.obj)")->required();
-    app.add_option("--scene", command.scene, "Where the scene is now");
+    app.add_option("file", command.file, "Transfer file; in a window also a scene (.obj)")
+        ->required()
+        ->type_name("FILE");
+    app.add_option("--scene", command.scene, "Where the scene is now")->type_name("SCENE");
     app.add_flag("--headless", command.headless, "No window: draw the frames of a path");
-    app.add_option("--frames", command.frames.frames, "Path of camera and light (.json)");
-    app.add_option("-o,--output", command.frames.folder, "Folder of frames, pictures and recorded paths");
+    app.add_option("--frames", command.frames.frames, "Path of camera and light (.json)")->type_name("FILE");
+    app.add_option("-o,--output", command.frames.folder, "Folder of frames, pictures and recorded paths")
+        ->type_name("FOLDER");
     app.add_option("--format", command.frames.format, "Of the frames: png or exr (default png)")
         ->check(CLI::IsMember({"png", "exr"}));
     app.add_option("--samples", command.frames.samples, "Samples a pixel of the frames (default 4)")
@@ -36,9 +47,11 @@ void add_options(CLI::App& app, ViewCommand& command) {
                    "OpenGL's: auto, glfw (a window), egl or osmesa (default auto)")
         ->check(CLI::IsMember({"auto", "glfw", "egl", "osmesa"}));
     app.add_option("--indirect", command.method,
-                   "How indirect light is drawn: splat, gather or auto, the faster (default auto)");
+                   "How indirect light is drawn: splat, gather or auto, the faster (default auto)")
+        ->type_name("splat|gather|auto");
     app.add_option("--layer", command.layer,
-                   "full, direct, indirect, irradiance, reflectance or normals (default full)");
+                   "full, direct, indirect, irradiance, reflectance or normals (default full)")
+        ->type_name("full|direct|indirect|irradiance|reflectance|normals");
     add_size_option(app, command.size);
     add_number(app, "--exposure", command.exposure, "Key of the tone map (default 0.18)");
     app.add_option("--threads", command.threads, "Threads to use (default 0: all processors)")
@@ -85,8 +98,10 @@ void run(ViewCommand& command) {
 } // namespace
 
 int main(int argc, char** argv) {
+    run_faster_twin(argv);
     CLI::App app("Interactive indirect light from a transfer file", "afterglow-view");
     app.set_version_flag("--version", AFTERGLOW_VERSION);
+    add_manual_options(app, manual);
     ViewCommand command;
     add_options(app, command);
     const auto fail = [](const std::exception& error, int status, const char* remedy = "") {

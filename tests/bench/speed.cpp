@@ -1,4 +1,5 @@
 #include "basis/openness.h"
+#include "core/embree.h"
 #include "core/parallel.h"
 #include "core/peak_memory.h"
 #include "core/sampling.h"
@@ -9,7 +10,6 @@
 #include "transport/transfer_file.h"
 
 #include <CLI/CLI.hpp>
-#include <embree3/rtcore.h>
 
 #include <algorithm>
 #include <array>
@@ -56,8 +56,6 @@ public:
 
     /// The sum of all distances, for something to come of it.
     double trace(std::span<const Ray> rays) const {
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
         double sum = 0.0;
         for (const Ray& ray : rays) {
             RTCRayHit query{};
@@ -67,7 +65,7 @@ public:
             query.ray.tfar = ray.length;
             query.ray.mask = ~0u;
             query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-            rtcIntersect1(scene_, &context, &query);
+            embree_intersect(scene_, query);
             if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) sum += query.ray.tfar;
         }
         return sum;
