@@ -17,7 +17,7 @@ ANYWHERE = r"Eigen/|[a-z_]+$|sys/\w+\.h$|(fcntl|immintrin|spawn|unistd)\.h$"  # 
 LIBRARIES = {  # how the included path starts -> the files, or folders' .cpp files, that may name it
     r"embree3/": {"core/surface.cpp"},
     r"OpenEXR/|Imf|Imath|Iex|half\.h": {"core/image.cpp"},
-    r"stb/|stb_": {"core/image.cpp", "core/obj_loader.cpp"},
+    r"stb/|stb_": {"core/image.cpp", "core/texture_file.cpp"},
     r"tiny_obj_loader": {"core/obj_loader.cpp"},
     r"tbb/|oneapi/": {"core/parallel.cpp"},
     r"nanoflann": {"basis/nearest_points.cpp"},

@@ -25,7 +25,7 @@ struct Entry {
         if (!object.is_object()) fail("is not an object");
         for (const auto& [name, value] : object.items())
             if (std::none_of(names.begin(), names.end(), [&](const char* n) { return name == n; }))
-                fail("unknown name \"" + name + "\"");
+                fail("unknown name \"" + printable(name) + "\"");
     }
     bool has(const char* name) const { return object.contains(name); }
     double number(const Json& value, const char* name) const {
@@ -87,7 +87,7 @@ std::vector<Frame> read_frame_path(const std::string& path) {
     try {
         all = Json::parse(text, text + bytes.size());
     } catch (const Json::exception& error) {
-        throw FileError(path, std::string("is no JSON: ") + error.what());
+        throw FileError(path, "is no JSON: " + printable(error.what(), 200));
     }
     if (!all.is_array() || all.empty()) throw FileError(path, "must be an array of frames");
     std::vector<Frame> frames;
