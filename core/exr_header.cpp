@@ -133,15 +133,18 @@ bool read_attribute(const std::string& path, Bytes& header, Part& part) {
 }
 
 void check_part(const std::string& path, const Part& part, std::size_t file_bytes) {
+    const auto is_side = [](std::int64_t length) { return length >= 0 && length <= longest_side; };
+    const bool has_sides = part.width > 0 && part.height > 0 && is_side(part.width) && is_side(part.height)
+                           && is_side(part.tile_width) && is_side(part.tile_height);
     // Buffers are as wide as the picture and as high as what is compressed at a time, or as a tile.
     const std::int64_t lines = part.compression == dwab ? 256 : 32;
-    const std::int64_t buffer = std::max(part.width * lines, part.tile_width * part.tile_height);
-    const std::int64_t most_values =
-        3 * std::min(most_pixels, most_pixels_per_byte * static_cast<std::int64_t>(file_bytes));
-    const auto possible = [](std::int64_t side) { return side >= 0 && side <= longest_side; };
-    if (part.width < 1 || part.height < 1 || !possible(part.width) || !possible(part.height)
-        || !possible(part.tile_width) || !possible(part.tile_height)
-        || std::max(part.width * part.height, buffer) > most_values / std::max<std::int64_t>(part.channels, 3))
+    const auto fits = [&](std::int64_t width, std::int64_t height) {
+        const auto bytes = static_cast<std::int64_t>(file_bytes);
+        return width * height <= 3 * std::min(most_pixels, most_pixels_per_byte * bytes)
+                                     / std::max<std::int64_t>(part.channels, 3);
+    };
+    if (!has_sides || !fits(part.width, std::max(part.height, lines))
+        || !fits(part.tile_width, part.tile_height))
         throw FileError(path, "has an impossible size of " + std::to_string(part.width) + "x"
                                   + std::to_string(part.height) + " pixels, or of its tiles, for "
                                   + std::to_string(file_bytes) + " bytes; write it again");

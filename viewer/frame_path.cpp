@@ -23,9 +23,11 @@ struct Entry {
     [[noreturn]] void fail(const std::string& what) const { throw FileError(file, where + ": " + what); }
     void allow(std::initializer_list<const char*> names) const {
         if (!object.is_object()) fail("is not an object");
-        for (const auto& [name, value] : object.items())
-            if (std::none_of(names.begin(), names.end(), [&](const char* n) { return name == n; }))
-                fail("unknown name \"" + printable(name) + "\"");
+        for (const auto& item : object.items()) {
+            const std::string& given = item.key();
+            if (std::none_of(names.begin(), names.end(), [&](const char* n) { return given == n; }))
+                fail("unknown name \"" + printable(given) + "\"");
+        }
     }
     bool has(const char* name) const { return object.contains(name); }
     double number(const Json& value, const char* name) const {

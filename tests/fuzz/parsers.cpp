@@ -1,6 +1,4 @@
-// The parsers of others, built here once more so that the sanitizers and the search for new paths see
-// inside them; a program prefers these to those of the shared libraries.
-#define STB_IMAGE_IMPLEMENTATION
-#include <stb_image.h>
+// The parser of others, built here once more so that the sanitizers and the search for new paths see inside
+// it; a program prefers it to that of the shared library.
 #define TINYOBJLOADER_IMPLEMENTATION
 #include <tiny_obj_loader.h>
