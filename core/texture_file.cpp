@@ -36,6 +36,7 @@ constexpr std::uint64_t most_texels = std::uint64_t{1} << 26;
 constexpr std::size_t most_bytes = 999'999'999; // stb_image counts them as int
 constexpr std::string_view png = "\x89PNG";
 constexpr std::size_t png_signature = 8;
+constexpr std::string_view jpeg = "\xff\xd8";
 
 float linear_from_srgb(int byte) {
     const float s = static_cast<float>(byte) / 255.0f;
@@ -52,17 +53,57 @@ std::uint64_t most_texels_in(std::string_view file) {
     return 8 * 1032 * file.size() / std::max<std::uint64_t>(depth, 1); // deflate packs 1032 bytes into one
 }
 
+/// The number that a picture starts with, in `bytes` bytes; 0 where there are fewer.
+std::uint64_t big_endian(std::string_view picture, std::size_t bytes) {
+    std::uint64_t number = 0;
+    for (const char c : picture.substr(0, picture.size() < bytes ? 0 : bytes))
+        number = number << 8 | static_cast<unsigned char>(c);
+    return number;
+}
+
 /// False where a chunk of a PNG file is longer than what is left: stb_image allocates what it claims.
 bool has_whole_chunks(std::string_view file) {
     constexpr std::size_t head = 8, tail = 4; // length and type; check sum
     file.remove_prefix(std::min(file.size(), png_signature));
     while (!file.starts_with("\0\0\0\0IEND"sv)) {
         if (file.size() < head) return false;
-        std::uint64_t length = 0;
-        for (int i = 0; i < 4; ++i)
-            length = length << 8 | static_cast<unsigned char>(file[static_cast<std::size_t>(i)]);
+        const std::uint64_t length = big_endian(file, 4);
         if (length + head + tail > file.size()) return false;
         file.remove_prefix(length + head + tail);
+    }
+    return true;
+}
+
+/// False where a table of a JPEG segment "Huffman tables" has more codes than a byte has values: stb_image
+/// writes them behind its array. `segment` starts with its length and may be longer.
+bool has_sound_tables(std::string_view segment) {
+    constexpr std::size_t lengths = 16, most_codes = 256;
+    segment = segment.substr(0, big_endian(segment, 2));
+    for (std::size_t at = 2; at + 1 + lengths <= segment.size();) {
+        std::size_t codes = 0;
+        for (std::size_t i = 1; i <= lengths; ++i)
+            codes += static_cast<unsigned char>(segment[at + i]);
+        if (codes > most_codes) return false;
+        at += 1 + lengths + codes;
+    }
+    return true;
+}
+
+/// Likewise of a JPEG file. Up to the first scan, segments are passed over as a whole; behind it anything
+/// may follow that looks like a table.
+bool has_sound_jpeg_tables(std::string_view file) {
+    constexpr char huffman_tables = '\xc4', scan = '\xda';
+    bool in_header = true;
+    for (std::size_t at = 2; at + 4 <= file.size();) {
+        const char marker = file[at + 1];
+        if (file[at] != '\xff' || marker == '\xff' || marker == '\0') {
+            ++at;
+            continue;
+        }
+        const std::string_view segment = file.substr(at + 2);
+        if (marker == huffman_tables && !has_sound_tables(segment)) return false;
+        in_header = in_header && marker != scan;
+        at += in_header ? 2 + big_endian(segment, 2) : 1;
     }
     return true;
 }
@@ -73,7 +114,9 @@ Texture read_picture(const std::string& path, const std::array<float, 256>& valu
     const MappedFile file(path);
     const auto bytes = file.bytes();
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (text.starts_with(png) && !has_whole_chunks(text)) throw FileError(path, "is damaged or cut short");
+    if ((text.starts_with(png) && !has_whole_chunks(text))
+        || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)))
+        throw FileError(path, "is damaged or cut short");
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
     const int size = bytes.size() <= most_bytes ? static_cast<int>(bytes.size()) : 0;
     Texture texture;
