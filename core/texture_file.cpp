@@ -36,7 +36,7 @@ constexpr std::uint64_t most_texels = std::uint64_t{1} << 26;
 constexpr std::size_t most_bytes = 999'999'999; // stb_image counts them as int
 constexpr std::string_view png = "\x89PNG";
 constexpr std::size_t png_signature = 8;
-constexpr std::string_view jpeg = "\xff\xd8";
+constexpr std::string_view jpeg = "\xff\xd8", filled_jpeg = "\xff\xff"; // stb_image would read both
 
 float linear_from_srgb(int byte) {
     const float s = static_cast<float>(byte) / 255.0f;
@@ -78,11 +78,11 @@ bool has_whole_chunks(std::string_view file) {
 /// writes them behind its array. `segment` starts with its length and may be longer.
 bool has_sound_tables(std::string_view segment) {
     constexpr std::size_t lengths = 16, most_codes = 256;
-    segment = segment.substr(0, big_endian(segment, 2));
-    for (std::size_t at = 2; at + 1 + lengths <= segment.size();) {
+    const std::uint64_t end = std::min<std::uint64_t>(big_endian(segment, 2), segment.size());
+    for (std::size_t at = 2; at < end;) {
         std::size_t codes = 0;
-        for (std::size_t i = 1; i <= lengths; ++i)
-            codes += static_cast<unsigned char>(segment[at + i]);
+        for (const char count : segment.substr(at + 1, lengths)) // beyond `end` as well
+            codes += static_cast<unsigned char>(count);
         if (codes > most_codes) return false;
         at += 1 + lengths + codes;
     }
@@ -115,7 +115,7 @@ Texture read_picture(const std::string& path, const std::array<float, 256>& valu
     const auto bytes = file.bytes();
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if ((text.starts_with(png) && !has_whole_chunks(text))
-        || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)))
+        || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)) || text.starts_with(filled_jpeg))
         throw FileError(path, "is damaged or cut short");
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
     const int size = bytes.size() <= most_bytes ? static_cast<int>(bytes.size()) : 0;
