@@ -2,11 +2,10 @@
 
 #include "core/error.h"
 #include "core/file.h"
-#include "core/normal_map.h"
 #include "core/polygon.h"
+#include "core/texture_file.h"
 
 #include <Eigen/Geometry>
-#include <stb_image.h>
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
@@ -33,7 +32,6 @@ constexpr float largest_coordinate = 1e18f;   // Embree's limit; cross products 
 constexpr float largest_reflectance = 0.999f; // at one, light would bounce forever
 constexpr std::size_t index_digits = 9;       // tinyobjloader reads indices as int
 constexpr std::size_t most_indices = 999'999'999;
-constexpr int most_texels = 1 << 26;
 
 // ---- Text
 // -------------------------------------------------------------------------------------------
@@ -142,14 +140,6 @@ private:
 // ---- Materials and textures
 // -------------------------------------------------------------------------
 
-/// A picture of normals, or of heights if it does not look like normals.
-struct NormalSource {
-    std::string file; // path, empty where there is none
-    bool may_be_heights = false;
-    float multiplier = 1.0f; // of heights
-    auto operator<=>(const NormalSource&) const = default;
-};
-
 struct MaterialSource {
     Material material;
     std::string texture_file; // path, empty where there is none
@@ -160,7 +150,22 @@ struct MaterialSource {
 fs::path beside(const fs::path& folder, std::string_view name) {
     std::string portable(trimmed(name));
     std::replace(portable.begin(), portable.end(), '\\', '/');
-    return folder / portable;
+    return folder / portable.c_str(); // a name ends at a zero, for the operating system as well
+}
+
+/// Notes a file that was read where it is not the user's folder, or one below it, that it came from.
+/// Symbolic links are followed: a link may lead anywhere.
+void note_if_outside(const std::string& file, const fs::path& folder, SceneSummary& summary) {
+    std::error_code failed;
+    const fs::path real_folder = fs::weakly_canonical(folder.empty() ? "." : folder, failed);
+    const fs::path real_file = failed ? fs::path() : fs::weakly_canonical(file, failed);
+    const bool inside =
+        !failed
+        && std::mismatch(real_folder.begin(), real_folder.end(), real_file.begin(), real_file.end())
+                   .first
+               == real_folder.end();
+    auto& known = summary.outside_files;
+    if (!inside && std::find(known.begin(), known.end(), file) == known.end()) known.push_back(file);
 }
 
 bool is_file(const fs::path& path) {
@@ -189,6 +194,7 @@ public:
             summary_.missing_files.push_back(path.string());
             return false;
         }
+        note_if_outside(path.string(), folder_, summary_);
         const std::size_t known = materials->size();
         tinyobj::LoadMtl(index, materials, &file, warnings, errors);
         for (std::size_t i = known; i < materials->size(); ++i)
@@ -220,55 +226,6 @@ private:
     SceneSummary& summary_;
     std::set<fs::path> asked_;
 };
-
-float linear_from_srgb(int byte) {
-    const float s = static_cast<float>(byte) / 255.0f;
-    return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
-}
-
-/// A picture whose bytes stand for the numbers of a table. Throws FileError where the file holds none
-/// that stb_image reads.
-Texture read_picture(const std::string& path, const std::array<float, 256>& value) {
-    const MappedFile file(path);
-    const auto bytes = file.bytes();
-    const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
-    const int size = bytes.size() <= most_indices ? static_cast<int>(bytes.size()) : 0;
-    Texture texture;
-    int channels = 0;
-    if (!stbi_info_from_memory(data, size, &texture.width, &texture.height, &channels)
-        || texture.width < 1 || texture.height < 1 || texture.width > most_texels / texture.height)
-        throw FileError(path, "is no picture of a usable size");
-    const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
-        stbi_load_from_memory(data, size, &texture.width, &texture.height, &channels, 3),
-        stbi_image_free);
-    if (!texels) throw FileError(path, "is damaged");
-
-    const std::size_t row = 3 * static_cast<std::size_t>(texture.width);
-    texture.rgb.resize(row * static_cast<std::size_t>(texture.height));
-    for (int y = 0; y < texture.height; ++y) { // the file's first row is on top
-        const stbi_uc* from = texels.get() + row * static_cast<std::size_t>(texture.height - 1 - y);
-        std::transform(from, from + row, &texture.rgb[row * static_cast<std::size_t>(y)],
-                       [&](stbi_uc byte) { return value[byte]; });
-    }
-    return texture;
-}
-
-Texture read_texture(const std::string& path) {
-    std::array<float, 256> linear{};
-    for (int i = 0; i < 256; ++i)
-        linear[static_cast<std::size_t>(i)] = linear_from_srgb(i);
-    return read_picture(path, linear);
-}
-
-Texture read_normal_map(const NormalSource& source) {
-    std::array<float, 256> share{};
-    for (int i = 0; i < 256; ++i)
-        share[static_cast<std::size_t>(i)] = static_cast<float>(i) / 255.0f;
-    Texture picture = read_picture(source.file, share);
-    return source.may_be_heights && !is_normal_map(picture)
-               ? normals_from_heights(picture, source.multiplier)
-               : normals_from_colours(std::move(picture));
-}
 
 // ---- Faces
 // ------------------------------------------------------------------------------------------
@@ -538,6 +495,7 @@ private:
         if (is_new) {
             try {
                 pictures.push_back(read());
+                note_if_outside(file, fs::path(scene_.name).parent_path(), scene_.summary);
                 entry->second = static_cast<std::uint32_t>(pictures.size() - 1);
             } catch (const FileError&) {
                 scene_.summary.missing_files.push_back(file);

@@ -1,6 +1,7 @@
 #include "core/scene.h"
 
 #include "core/builtin_scenes.h"
+#include "core/error.h"
 #include "core/file.h"
 #include "core/obj_loader.h"
 
@@ -30,6 +31,18 @@ struct Neighbours {
 /// Appends "count what" where count is not zero.
 void append(std::string& line, std::uint64_t count, const std::string& what) {
     if (count > 0) line += (line.empty() ? "" : ", ") + std::to_string(count) + " " + what;
+}
+
+/// "what a, b, c and 2 more"; empty where there are no names. A name out of a damaged file may hold
+/// anything.
+std::string list(const std::string& what, const std::vector<std::string>& names) {
+    constexpr std::size_t most_names = 5, longest = 256;
+    std::string text;
+    for (std::size_t i = 0; i < std::min(names.size(), most_names); ++i)
+        text += (i == 0 ? what : ", ") + printable(names[i], longest);
+    if (names.size() > most_names)
+        text += " and " + std::to_string(names.size() - most_names) + " more";
+    return text;
 }
 
 template <class T>
@@ -64,15 +77,13 @@ std::string SceneSummary::line() const {
         std::to_string(faces) + " faces, " + std::to_string(triangles) + " triangles";
     if (!dropped.empty()) line += "; dropped: " + dropped;
     if (!mended.empty()) line += "; " + mended;
-    constexpr std::size_t most_names = 5;
-    for (std::size_t i = 0; i < std::min(missing_files.size(), most_names); ++i)
-        line += (i == 0 ? "; cannot read " : ", ") + missing_files[i];
-    if (missing_files.size() > most_names)
-        line += " and " + std::to_string(missing_files.size() - most_names) + " more";
-    // A name out of a damaged file may hold anything.
-    std::replace_if(
-        line.begin(), line.end(), [](unsigned char c) { return c < 32; }, '?');
+    line += list("; cannot read ", missing_files);
+    if (!outside_files.empty()) line += "; " + outside_line();
     return line;
+}
+
+std::string SceneSummary::outside_line() const {
+    return list("read from outside the scene's folder: ", outside_files);
 }
 
 Eigen::AlignedBox3f Scene::bounds() const {

@@ -40,7 +40,9 @@ struct SceneSummary {
     std::uint64_t default_material = 0;      // triangles without a known material
     std::uint64_t clamped_reflectance = 0;   // materials outside [0, 1)
     std::vector<std::string> missing_files;  // MTL files and textures that could not be read
+    std::vector<std::string> outside_files;  // read, though not in the scene's folder or below it
     std::string line() const;                // one line, only what is not zero
+    std::string outside_line() const;        // of outside_files alone; empty where there are none
 };
 
 /// Static triangles with Lambertian reflectance. Indices are valid and coordinates finite.

@@ -18,7 +18,7 @@ PRIVATE = {"core/embree.h": {"core/surface.cpp"}}  # headers that show a library
 LIBRARIES = {  # how the included path starts -> the files, or folders' .cpp files, that may name it
     r"embree[34]/": {"core/embree.h"},
     r"OpenEXR/|Imf|Imath|Iex|half\.h": {"core/image.cpp"},
-    r"stb/|stb_": {"core/image.cpp", "core/obj_loader.cpp"},
+    r"stb/|stb_": {"core/image.cpp", "core/texture_file.cpp"},
     r"tiny_obj_loader": {"core/obj_loader.cpp"},
     r"tbb/|oneapi/": {"core/parallel.cpp"},
     r"nanoflann": {"basis/nearest_points.cpp"},

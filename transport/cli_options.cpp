@@ -34,7 +34,7 @@ void parse_size(const std::string& text, Camera& camera) {
     if (cross == std::string::npos || !parse(view.substr(0, cross), camera.width)
         || !parse(view.substr(cross + 1), camera.height) || camera.width < 1 || camera.height < 1
         || camera.width > 32768 || camera.height > 32768)
-        throw UsageError("--size must be WIDTHxHEIGHT in pixels, each from 1 to 32768, not '" + text
+        throw UsageError("--size must be WIDTHxHEIGHT in pixels, each from 1 to 32768, not '" + printable(text)
                          + "'");
 }
 
@@ -48,7 +48,7 @@ Eigen::VectorXf parse_numbers(const std::string& option, const std::string& text
         if ((comma == std::string_view::npos) != (i + 1 == count)
             || !parse(rest.substr(0, comma), values[i]) || !std::isfinite(values[i]))
             throw UsageError(option + " must be " + std::to_string(count)
-                             + " finite numbers with commas between them, not '" + text + "'");
+                             + " finite numbers with commas between them, not '" + printable(text) + "'");
         if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);
     }
     return values;
@@ -61,7 +61,7 @@ CLI::Option* add_number(CLI::App& command, const std::string& option, double& va
             option,
             [option, &value](const std::string& text) {
                 if (!parse(text, value) || !std::isfinite(value))
-                    throw UsageError(option + " must be a finite number, not '" + text + "'");
+                    throw UsageError(option + " must be a finite number, not '" + printable(text) + "'");
             },
             help)
         ->type_name("NUMBER");
@@ -142,7 +142,7 @@ void add_seed_option(CLI::App& command, RunOptions& run) {
             "--seed",
             [&run](const std::string& text) {
                 if (!parse(text, run.seed))
-                    throw UsageError("--seed must be an integer from 0 to 2^64 - 1, not '" + text
+                    throw UsageError("--seed must be an integer from 0 to 2^64 - 1, not '" + printable(text)
                                      + "'");
             },
             "Seed of all random numbers (default 1)")

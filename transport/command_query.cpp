@@ -27,6 +27,7 @@ void run(QueryCommand& command) {
     const ThreadLimit limit(command.run.threads);
     const std::vector<SurfacePoint> points = read_points_csv(command.points);
     const TransferScene opened(command.file, command.scene);
+    if (!command.run.quiet) tell_of_outside_files(opened.scene);
     const VectorIrradiance field = opened.transport.indirect(command.light);
     Index uncovered = 0;
     const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, command.light, &uncovered);

@@ -56,6 +56,7 @@ void run(RenderCommand& command) {
     check_output(command.output);
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
+    if (!command.run.quiet) tell_of_outside_files(opened.scene);
 
     const auto start = Clock::now();
     NeumannStatistics neumann;

@@ -57,7 +57,7 @@ void read_rows(const std::string& path, const char* names, const Use& use) {
                 throw FileError(path, where + "must hold " + std::to_string(columns) + " numbers "
                                           + names);
             if (!parse_number(rest.substr(0, comma), row[c]))
-                throw FileError(path, where + "'" + std::string(trimmed(rest.substr(0, comma)))
+                throw FileError(path, where + "'" + printable(std::string(trimmed(rest.substr(0, comma))))
                                           + "' is not a finite number");
             if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);
         }

@@ -311,14 +311,6 @@ private:
         return list.get<std::vector<std::uint64_t>>();
     }
 
-    /// A name from the file for a message of one short line.
-    static std::string printable(std::string text) {
-        if (text.size() > 64) text = text.substr(0, 64) + "...";
-        std::replace_if(
-            text.begin(), text.end(), [](unsigned char c) { return c < 32 || c == 127; }, '?');
-        return text;
-    }
-
     const std::string& path_;
     std::span<const std::byte> file_;
     std::span<const std::byte> data_; // what follows the header

@@ -26,4 +26,8 @@ struct TransferScene {
     TransferScene& operator=(const TransferScene&) = delete;
 };
 
+/// Names on stderr, in one line, the files that the scene took from outside its folder; nothing where
+/// there are none. For programs that open a transfer file: what else was mended, precompute told.
+void tell_of_outside_files(const Scene& scene);
+
 } // namespace afterglow

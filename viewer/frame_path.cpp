@@ -23,9 +23,11 @@ struct Entry {
     [[noreturn]] void fail(const std::string& what) const { throw FileError(file, where + ": " + what); }
     void allow(std::initializer_list<const char*> names) const {
         if (!object.is_object()) fail("is not an object");
-        for (const auto& [name, value] : object.items())
-            if (std::none_of(names.begin(), names.end(), [&](const char* n) { return name == n; }))
-                fail("unknown name \"" + name + "\"");
+        for (const auto& item : object.items()) {
+            const std::string& given = item.key();
+            if (std::none_of(names.begin(), names.end(), [&](const char* n) { return given == n; }))
+                fail("unknown name \"" + printable(given) + "\"");
+        }
     }
     bool has(const char* name) const { return object.contains(name); }
     double number(const Json& value, const char* name) const {
@@ -87,7 +89,7 @@ std::vector<Frame> read_frame_path(const std::string& path) {
     try {
         all = Json::parse(text, text + bytes.size());
     } catch (const Json::exception& error) {
-        throw FileError(path, std::string("is no JSON: ") + error.what());
+        throw FileError(path, "is no JSON: " + printable(error.what(), 200));
     }
     if (!all.is_array() || all.empty()) throw FileError(path, "must be an array of frames");
     std::vector<Frame> frames;

@@ -92,6 +92,7 @@ void run(ViewCommand& command) {
         throw UsageError("--headless needs --frames PATH.json and -o FOLDER");
     if (frames.context == "glfw") throw UsageError("--headless has no window: --context egl or osmesa");
     const TransferScene scene(command.file, command.scene);
+    tell_of_outside_files(scene.scene);
     draw_frames(scene, frames);
 }
 

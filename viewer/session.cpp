@@ -54,6 +54,7 @@ Session::Session(const Gl& gl, const std::string& file, const std::string& scene
           const auto field = solver.solve(pose);
           return LitField{pose, field, solver.statistics()};
       }) {
+    tell_of_outside_files(scene.scene);
     light = first_light(camera, scene_size);
     light_thread.set(light);
 }

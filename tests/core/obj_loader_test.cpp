@@ -385,5 +385,58 @@ TEST(ObjTextures, ThatAreMissingOrDamagedAreNamedOnceAndIgnored) {
     }
 }
 
+TEST(ObjPaths, ThatLeadOutsideTheFolderAreReadAndNamed) {
+    const TemporaryFolder folder;
+    folder.write("other/a.mtl", "newmtl wall\nmap_Kd picture.png\nmap_Bump ../scene/deep/flat.png\n");
+    write_picture(folder.path("other/picture.png"));
+    std::filesystem::create_directories(folder.path("scene/deep"));
+    write_picture(folder.path("scene/deep/flat.png"));
+    const Scene scene =
+        load_obj(folder.write("scene/a.obj", "mtllib ../other/a.mtl\n" + textured_square));
+    EXPECT_EQ(scene.textures.size(), 1u);
+    EXPECT_EQ(scene.normal_maps.size(), 1u);
+    const std::vector<std::string> outside = {folder.path("scene/../other/a.mtl"),
+                                              folder.path("scene/../other/picture.png")};
+    EXPECT_EQ(scene.summary.outside_files, outside);
+    EXPECT_NE(scene.summary.line().find("; read from outside the scene's folder: " + outside[0] + ", "),
+              std::string::npos)
+        << scene.summary.line();
+}
+
+TEST(ObjPaths, AreFollowedThroughSymbolicLinks) {
+    const TemporaryFolder folder;
+    folder.write("elsewhere/a.mtl", "newmtl wall\nKd 0.2 0.4 0.6\n");
+    std::filesystem::create_directory(folder.path("scene"));
+    std::filesystem::create_symlink(folder.path("elsewhere/a.mtl"), folder.path("scene/a.mtl"));
+    const std::string obj = folder.write("scene/a.obj", "mtllib a.mtl\n" + textured_square);
+    EXPECT_EQ(load_obj(obj).summary.outside_files, std::vector<std::string>{folder.path("scene/a.mtl")});
+
+    // A link to the whole scene leads nowhere else.
+    std::filesystem::remove(folder.path("scene/a.mtl"));
+    folder.write("scene/a.mtl", "newmtl wall\n");
+    std::filesystem::create_directory_symlink(folder.path("scene"), folder.path("link"));
+    EXPECT_TRUE(load_obj(folder.path("link/a.obj")).summary.outside_files.empty());
+}
+
+TEST(ObjPaths, ToWhatIsNoPictureOrMaterialAreNamedAsWell) {
+    const TemporaryFolder folder;
+    folder.write("a.mtl", "newmtl wall\nmap_Kd /etc/passwd\nmap_Bump /dev/zero\n");
+    const Scene scene =
+        load_obj(folder.write("a.obj", "mtllib /etc/passwd\nmtllib a.mtl\n" + textured_square));
+    EXPECT_EQ(scene.summary.outside_files, std::vector<std::string>{"/etc/passwd"});
+    const std::vector<std::string> unreadable = {"/etc/passwd", "/dev/zero"};
+    EXPECT_EQ(scene.summary.missing_files, unreadable);
+}
+
+TEST(ObjPaths, InsideTheFolderNeedNoWord) {
+    const TemporaryFolder folder;
+    folder.write("sub/a.mtl", "newmtl wall\nmap_Kd ../picture.png\n");
+    write_picture(folder.path("picture.png"));
+    const Scene scene = load_obj(folder.write("a.obj", "mtllib sub/a.mtl\n" + textured_square));
+    EXPECT_EQ(scene.textures.size(), 1u);
+    EXPECT_EQ(scene.summary.line(), "1 faces, 2 triangles");
+    EXPECT_EQ(scene.summary.outside_line(), "");
+}
+
 } // namespace
 } // namespace afterglow

@@ -1,0 +1,167 @@
+#include "core/texture_file.h"
+
+#include "core/error.h"
+#include "core/file.h"
+#include "core/normal_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <string_view>
+
+// Built here rather than taken from the shared library: the readers of other formats follow null pointers
+// or read behind their buffers where a file is damaged, and that of JPEG uses tables which the file never
+// filled. Of zeros, the same file gives the same picture.
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_ONLY_BMP
+#define STBI_ONLY_JPEG
+#define STBI_ONLY_PNG
+#define STBI_ONLY_TGA
+#define STBI_NO_STDIO
+#define STBI_MALLOC(size) std::calloc(size, 1)
+#define STBI_REALLOC std::realloc
+#define STBI_FREE std::free
+#include <stb_image.h>
+
+namespace afterglow {
+namespace {
+
+using namespace std::string_view_literals;
+
+constexpr std::uint64_t most_texels = std::uint64_t{1} << 26;
+constexpr std::size_t most_bytes = 999'999'999; // stb_image counts them as int
+constexpr std::string_view png = "\x89PNG";
+constexpr std::size_t png_signature = 8;
+constexpr std::string_view jpeg = "\xff\xd8", filled_jpeg = "\xff\xff"; // stb_image would read both
+
+float linear_from_srgb(int byte) {
+    const float s = static_cast<float>(byte) / 255.0f;
+    return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
+}
+
+/// As many texels as a picture file of this size can hold, however even its colour. stb_image fills up
+/// what is missing, so that a header alone would come out as a picture as large as it says.
+std::uint64_t most_texels_in(std::string_view file) {
+    constexpr std::size_t depth_at = 24; // bits a channel
+    if (file.size() <= depth_at || !file.starts_with(png))
+        return 1024 * file.size(); // JPEG packs best: no less than a bit for 64 texels of a channel
+    const auto depth = std::uint64_t{static_cast<unsigned char>(file[depth_at])};
+    return 8 * 1032 * file.size() / std::max<std::uint64_t>(depth, 1); // deflate packs 1032 bytes into one
+}
+
+/// The number that a picture starts with, in `bytes` bytes; 0 where there are fewer.
+std::uint64_t big_endian(std::string_view picture, std::size_t bytes) {
+    std::uint64_t number = 0;
+    for (const char c : picture.substr(0, picture.size() < bytes ? 0 : bytes))
+        number = number << 8 | static_cast<unsigned char>(c);
+    return number;
+}
+
+/// False where a chunk of a PNG file is longer than what is left: stb_image allocates what it claims.
+bool has_whole_chunks(std::string_view file) {
+    constexpr std::size_t head = 8, tail = 4; // length and type; check sum
+    file.remove_prefix(std::min(file.size(), png_signature));
+    while (!file.starts_with("\0\0\0\0IEND"sv)) {
+        if (file.size() < head) return false;
+        const std::uint64_t length = big_endian(file, 4);
+        if (length + head + tail > file.size()) return false;
+        file.remove_prefix(length + head + tail);
+    }
+    return true;
+}
+
+/// False where a table of a JPEG segment "Huffman tables" has more codes than a byte has values: stb_image
+/// writes them behind its array. `segment` starts with its length and may be longer.
+bool has_sound_tables(std::string_view segment) {
+    constexpr std::size_t lengths = 16, most_codes = 256;
+    const std::uint64_t end = std::min<std::uint64_t>(big_endian(segment, 2), segment.size());
+    for (std::size_t at = 2; at < end;) {
+        std::size_t codes = 0;
+        for (const char count : segment.substr(at + 1, lengths)) // beyond `end` as well
+            codes += static_cast<unsigned char>(count);
+        if (codes > most_codes) return false;
+        at += 1 + lengths + codes;
+    }
+    return true;
+}
+
+/// Likewise of a JPEG file. Up to the first scan, segments are passed over as a whole; behind it anything
+/// may follow that looks like a table.
+bool has_sound_jpeg_tables(std::string_view file) {
+    constexpr char huffman_tables = '\xc4', scan = '\xda';
+    bool in_header = true;
+    for (std::size_t at = 2; at + 4 <= file.size();) {
+        const char marker = file[at + 1];
+        if (file[at] != '\xff' || marker == '\xff' || marker == '\0') {
+            ++at;
+            continue;
+        }
+        const std::string_view segment = file.substr(at + 2);
+        if (marker == huffman_tables && !has_sound_tables(segment)) return false;
+        in_header = in_header && marker != scan;
+        at += in_header ? 2 + big_endian(segment, 2) : 1;
+    }
+    return true;
+}
+
+/// A picture whose bytes stand for the numbers of a table. Throws FileError where the file holds none
+/// that stb_image reads.
+Texture read_picture(const std::string& path, const std::array<float, 256>& value) {
+    const MappedFile file(path);
+    const auto bytes = file.bytes();
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if ((text.starts_with(png) && !has_whole_chunks(text))
+        || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)) || text.starts_with(filled_jpeg))
+        throw FileError(path, "is damaged or cut short");
+    const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
+    const int size = bytes.size() <= most_bytes ? static_cast<int>(bytes.size()) : 0;
+    Texture texture;
+    int channels = 0;
+    if (!stbi_info_from_memory(data, size, &texture.width, &texture.height, &channels)
+        || texture.width < 1 || texture.height < 1)
+        throw FileError(path, "is no picture in PNG, JPEG, TGA or BMP");
+    const std::uint64_t count =
+        static_cast<std::uint64_t>(texture.width) * static_cast<std::uint64_t>(texture.height);
+    if (count > std::min(most_texels, most_texels_in(text)))
+        throw FileError(path, "has an impossible size of " + std::to_string(texture.width) + "x"
+                                  + std::to_string(texture.height) + " texels in "
+                                  + std::to_string(bytes.size()) + " bytes");
+    const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
+        stbi_load_from_memory(data, size, &texture.width, &texture.height, &channels, 3),
+        stbi_image_free);
+    if (!texels) throw FileError(path, "is damaged");
+
+    const std::size_t row = 3 * static_cast<std::size_t>(texture.width);
+    texture.rgb.resize(row * static_cast<std::size_t>(texture.height));
+    for (int y = 0; y < texture.height; ++y) { // the file's first row is on top
+        const stbi_uc* from = texels.get() + row * static_cast<std::size_t>(texture.height - 1 - y);
+        std::transform(from, from + row, &texture.rgb[row * static_cast<std::size_t>(y)],
+                       [&](stbi_uc byte) { return value[byte]; });
+    }
+    return texture;
+}
+
+} // namespace
+
+Texture read_texture(const std::string& path) {
+    std::array<float, 256> linear{};
+    for (int i = 0; i < 256; ++i)
+        linear[static_cast<std::size_t>(i)] = linear_from_srgb(i);
+    return read_picture(path, linear);
+}
+
+Texture read_normal_map(const NormalSource& source) {
+    std::array<float, 256> share{};
+    for (int i = 0; i < 256; ++i)
+        share[static_cast<std::size_t>(i)] = static_cast<float>(i) / 255.0f;
+    Texture picture = read_picture(source.file, share);
+    return source.may_be_heights && !is_normal_map(picture)
+               ? normals_from_heights(picture, source.multiplier)
+               : normals_from_colours(std::move(picture));
+}
+
+} // namespace afterglow
