@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,11 @@ struct SamplerCase {
     /// sum (p' - p)^2 / p of a small error e, in units of e^2.
     double effect = 1.0;
 };
+
+/// How a failed test names it.
+inline void PrintTo(const SamplerCase& sampler, std::ostream* out) {
+    *out << sampler.name;
+}
 
 /// Every sampler whose draws are random, from Rng, from a scrambled sequence or from both.
 const std::vector<SamplerCase>& sampler_cases();

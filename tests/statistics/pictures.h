@@ -6,6 +6,7 @@
 #include "transport/path_tracer.h"
 #include "transport/spotlight.h"
 
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,11 @@ struct PictureSetting {
 
     Scene scene() const;
 };
+
+/// How a failed test names it.
+inline void PrintTo(const PictureSetting& setting, std::ostream* out) {
+    *out << setting.name;
+}
 
 /// builtin:cornell and builtin:two_rooms.
 const std::vector<PictureSetting>& picture_settings();

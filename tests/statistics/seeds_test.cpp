@@ -24,6 +24,9 @@ struct Strategies {
     const char* name;
     PathStrategy first, second;
 };
+void PrintTo(const Strategies& compared, std::ostream* out) {
+    *out << compared.name;
+}
 constexpr Strategies strategies[] = {
     {"PlainPaths", PathStrategy::plain, PathStrategy::plain},
     {"ConnectedPaths", PathStrategy::connected, PathStrategy::connected},
