@@ -63,6 +63,10 @@ Vec3 sample_vector_irradiance(const Vec2& u) {
     return from_polar(0.5f * (-1.0f + std::sqrt(1.0f + 8.0f * (1.0f - u.x()))), two_pi * u.y());
 }
 
+Vec3 sample_cone(const Vec2& u, float height) {
+    return from_polar(1.0f - u.x() * height, two_pi * u.y());
+}
+
 Vec3 sample_sphere(const Vec2& u) {
     return from_polar(1.0f - 2.0f * u.x(), two_pi * u.y());
 }

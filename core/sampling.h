@@ -74,6 +74,10 @@ inline float vector_irradiance_pdf(float cos_theta) {
     return (cos_theta + 0.5f) * static_cast<float>(0.5 / EIGEN_PI);
 }
 
+/// Uniform direction within the cone about +z whose spherical cap is `height` = 1 - cos(half-angle)
+/// high, density 1 / (2 pi height).
+Vec3 sample_cone(const Vec2& u, float height);
+
 /// Uniform direction over the whole sphere, density 1 / (4 pi).
 Vec3 sample_sphere(const Vec2& u);
 

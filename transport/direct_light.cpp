@@ -181,12 +181,9 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
         std::array<Hit, packet> hits;
         for (Index k = first; k < last; ++k) {
             const Vec2 u = scrambled_sobol2(static_cast<std::uint32_t>(k), 17);
-            const float c = 1.0f - u.x() * height;
-            const float s = std::sqrt(std::max(0.0f, 1.0f - c * c));
-            const float phi = 2.0f * static_cast<float>(EIGEN_PI) * u.y();
-            rays[k - first] = {light.position,
-                               frame.to_world({s * std::cos(phi), s * std::sin(phi), c}), farthest};
-            falloff[k - first] = falloff_of(c);
+            const Vec3 local = sample_cone(u, height);
+            rays[k - first] = {light.position, frame.to_world(local), farthest};
+            falloff[k - first] = falloff_of(local.z());
         }
         const auto count = static_cast<std::size_t>(last - first);
         surface_.closest_hits(std::span(rays).first(count), std::span(hits).first(count));

@@ -299,10 +299,12 @@ PictureEstimate render_reference(const Surface& surface, const Spotlight& light,
     const MeanEstimate means = estimate_means(pixel_count, 1, sampler, all);
 
     PictureEstimate result;
-    result.image = Image(camera.width, camera.height);
-    for (Index k = 0; k < pixel_count; ++k)
-        result.image.set_pixel(static_cast<int>(k % camera.width),
-                               static_cast<int>(k / camera.width), means.mean.col(k));
+    result.image = result.variance = Image(camera.width, camera.height);
+    for (Index k = 0; k < pixel_count; ++k) {
+        const auto x = static_cast<int>(k % camera.width), y = static_cast<int>(k / camera.width);
+        result.image.set_pixel(x, y, means.mean.col(k));
+        result.variance.set_pixel(x, y, means.standard_error.col(k).square());
+    }
     result.relative_error = means.relative_error[0] / to_all;
     result.samples = means.samples;
     result.rays = means.rays;

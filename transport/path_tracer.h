@@ -73,6 +73,7 @@ std::string layer_name(Layer layer);
 
 struct PictureEstimate {
     Image image;                 // no attributes; black where the camera sees nothing
+    Image variance;              // of each value of `image`, from the spread of the batches
     double relative_error = 0.0; // over the pixels that see something
     std::uint64_t samples = 0, rays = 0;
 };
