@@ -19,9 +19,6 @@ constexpr double aim = 0.8, safely = 0.9;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
 
-/// Times those of the verification, as sixteen times its lights and twice its places are compared.
-constexpr std::uint64_t search_rays = 3;
-
 /// Of spacings: where a single place decides, less may do than it seems; and a step that costs less than half as
 /// much again as the last is not worth it.
 constexpr double largest_step = 0.3, smallest_step = 0.75;
@@ -68,11 +65,11 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         // The same lights and places each time, by ever more paths. Few lights a trial, as a sixth of
         // its places are in sight of each: what is close to a light is the hardest.
         const Verifier verifier(surface, report.viewpoints,
-                                {.trials = 16,
+                                {.trials = 8,
                                  .lights = 3,
-                                 .places = 125,
+                                 .places = 250,
                                  .reference_error = 0.5 * tuning.target_error, // its noise is taken out
-                                 .most_rays = search_rays * verification_rays(report),
+                                 .most_rays = verification_rays(report),
                                  .seed = hash64(options.seed, 0x7a5e)});
         result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
         const TuningStep& last = result.steps.back();

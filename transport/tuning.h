@@ -45,7 +45,7 @@ struct TuningReport {
 };
 
 /// Chooses the spacing of the functions by itself: a coarse precomputation is compared with the path
-/// tracer under 48 random lights; error goes about like a power of the spacing, near one, so that
+/// tracer under two dozen random lights; error goes about like a power of the spacing, near one, so that
 /// the next step's spacing follows; and so on until the target is met. Mostly two steps, of which the
 /// first takes a small part of the time. Other lights and places should tell how well it went, as the
 /// steps were chosen by these. Above 10 %, what is dropped of links follows the target too
