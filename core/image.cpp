@@ -18,6 +18,7 @@
 #include <cassert>
 #include <cmath>
 #include <half.h>
+#include <new>
 #include <span>
 
 namespace afterglow {
@@ -95,7 +96,7 @@ std::string compress_png(int width, int height, std::span<const unsigned char> r
                                                   static_cast<std::size_t>(size));
     };
     if (stbi_write_png_to_func(append, &png, width, height, 3, rgb.data(), 3 * width) == 0)
-        throw Error("not enough memory to compress the picture");
+        throw std::bad_alloc();
     return png;
 }
 
@@ -125,6 +126,8 @@ void write_image(const std::string& path, const Image& image, PixelType type,
         else
             throw UsageError(path + ": a picture's name must end in .exr or .png");
     } catch (const Error&) {
+        throw;
+    } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& e) {
         throw FileError(path, std::string("cannot be encoded: ") + e.what());
@@ -162,6 +165,8 @@ Image read_exr(const std::string& path) {
                 image.attributes[a.name()] = text->value();
         return image;
     } catch (const Error&) {
+        throw;
+    } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& e) {
         throw FileError(path, std::string("cannot be read as OpenEXR: ") + e.what());

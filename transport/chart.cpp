@@ -1,6 +1,7 @@
 #include "transport/chart.h"
 
 #include "core/error.h"
+#include "core/process_end.h"
 #include "core/sampling.h"
 #include "core/seconds.h"
 #include "transport/path_tracer.h"
@@ -11,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <unistd.h>
 
 namespace afterglow {
 namespace {
@@ -142,6 +144,7 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     point.coarse_radius = transfer.points.spacing[0];
 
     const std::string file = folder_ + "/chart.safetensors";
+    const AtEarlyEnd at_early_end([&] { ::unlink(file.c_str()); });
     save_transfer(file, transfer, {AFTERGLOW_VERSION, surface_.scene().name, "", seed_, "{}", "{}"});
     point.bytes = std::filesystem::file_size(file);
     std::filesystem::remove(file);

@@ -1,13 +1,11 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "transport/cli_options.h"
+#include "transport/program.h"
 #include "viewer/headless.h"
 #include "viewer/viewer_app.h"
 
 #include <CLI/CLI.hpp>
-
-#include <cstdio>
-#include <exception>
 
 namespace {
 
@@ -89,21 +87,5 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", AFTERGLOW_VERSION);
     ViewCommand command;
     add_options(app, command);
-    const auto fail = [](const std::exception& error, int status, const char* remedy = "") {
-        std::fprintf(stderr, "afterglow-view: %s%s\n", error.what(), remedy);
-        return status;
-    };
-    try {
-        app.parse(argc, argv);
-        run(command);
-        return 0;
-    } catch (const CLI::Success& help) {
-        return app.exit(help);
-    } catch (const CLI::ParseError& error) {
-        return fail(error, 2, "; see --help");
-    } catch (const UsageError& error) {
-        return fail(error, 2);
-    } catch (const std::exception& error) {
-        return fail(error, 1);
-    }
+    return run_program(app, argc, argv, [&] { run(command); });
 }
