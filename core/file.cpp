@@ -1,6 +1,7 @@
 #include "core/file.h"
 
 #include "core/error.h"
+#include "core/process_end.h"
 
 #include <xxhash.h>
 
@@ -10,6 +11,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -21,35 +23,97 @@ namespace {
 /// Closes its file descriptor when it goes out of scope.
 class Descriptor {
 public:
+    Descriptor() = default;
     Descriptor(const std::string& path, int flags)
         : fd_(::open(path.c_str(), flags | O_CLOEXEC, 0666)) {}
     ~Descriptor() {
         if (fd_ >= 0) ::close(fd_);
     }
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
+    Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+    Descriptor& operator=(Descriptor&& other) noexcept {
+        std::swap(fd_, other.fd_);
+        return *this;
+    }
     explicit operator bool() const { return fd_ >= 0; }
     operator int() const { return fd_; }
     /// False where the operating system reports a late write error.
     bool close() { return ::close(std::exchange(fd_, -1)) == 0; }
 
 private:
-    int fd_;
+    int fd_ = -1;
 };
 
 std::string reason() {
     return std::strerror(errno);
 }
 
-/// Removes a file that was not renamed away.
-struct TemporaryFile {
-    std::string path;
-    ~TemporaryFile() { ::unlink(path.c_str()); }
+std::filesystem::path folder_of(const std::string& path) {
+    const auto folder = std::filesystem::path(path).parent_path();
+    return folder.empty() ? "." : folder;
+}
+
+constexpr const char* unfinished = ".part-";
+
+/// A new file beside its target, which goes away unless it is renamed. It is locked while it is
+/// written: so another process can tell it from one that was left behind.
+class UnfinishedFile {
+public:
+    explicit UnfinishedFile(const std::string& target) {
+        static std::atomic<unsigned> counter{0};
+        do {
+            {
+                const auto hold = hold_off_early_end();
+                path_ = target + unfinished + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+                file_ = Descriptor(path_, O_WRONLY | O_CREAT | O_EXCL);
+                exists_ = static_cast<bool>(file_);
+            }
+            // EEXIST: of a process with our number, that was killed or lives on another machine.
+            if (!file_ && errno != EEXIST) throw FileError(target, "cannot be created: " + reason());
+        } while (!file_ || !lock());
+    }
+    ~UnfinishedFile() { remove(); }
+    UnfinishedFile(const UnfinishedFile&) = delete;
+    UnfinishedFile& operator=(const UnfinishedFile&) = delete;
+
+    int descriptor() const { return file_; }
+
+    void rename_to(const std::string& target, const std::string& path) {
+        if (::fsync(file_) != 0) throw FileError(path, "cannot be written to disk: " + reason());
+        const auto hold = hold_off_early_end();
+        if (::rename(path_.c_str(), target.c_str()) != 0)
+            throw FileError(path, "cannot be replaced: " + reason());
+        exists_ = false;
+    }
+
+private:
+    /// False where it was taken for left behind, and removed, before it was locked. A file system
+    /// that knows no locks has none to lose.
+    bool lock() {
+        struct stat status {};
+        ::flock(file_, LOCK_EX);
+        return ::fstat(file_, &status) == 0 && status.st_nlink > 0;
+    }
+    void remove() {
+        if (exists_) ::unlink(path_.c_str());
+    }
+
+    std::string path_;
+    Descriptor file_;
+    bool exists_ = false;
+    AtEarlyEnd at_early_end_{[this] { remove(); }};
 };
 
-std::string temporary_beside(const std::string& target) {
-    static std::atomic<unsigned> counter{0};
-    return target + ".part-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+/// Removes what processes that were killed have left of a target.
+void remove_left_behind(const std::string& target) {
+    const std::string start = std::filesystem::path(target).filename().string() + unfinished;
+    std::error_code failure;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_of(target), failure)) {
+        const std::string name = entry.path().filename().string();
+        if (!name.starts_with(start) || name.find_first_not_of("0123456789-", start.size()) != std::string::npos)
+            continue;
+        const Descriptor file(entry.path().string(), O_WRONLY | O_NONBLOCK | O_NOFOLLOW);
+        if (file && ::flock(file, LOCK_EX | LOCK_NB) == 0) ::unlink(entry.path().c_str());
+    }
 }
 
 /// The file that a path stands for once symbolic links are followed.
@@ -62,49 +126,46 @@ std::string behind_links(const std::string& path) {
 
 } // namespace
 
-void write_atomically(const std::string& path,
-                      const std::function<void(const std::string& temporary_path)>& write) {
+void OutputFile::write(std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+        const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0)
+            throw FileError(path_, "cannot be written: " + reason() + "; make room, or name another folder");
+        bytes = bytes.subspan(static_cast<std::size_t>(count));
+    }
+}
+
+void write_atomically(const std::string& path, const std::function<void(OutputFile&)>& write) {
     const std::string target = behind_links(path);
     struct stat status {};
     if (::stat(target.c_str(), &status) == 0) {
         if (S_ISDIR(status.st_mode)) throw FileError(path, "is a directory; name a file in it");
         // A device or pipe is written to, never replaced.
-        if (!S_ISREG(status.st_mode)) return write(target);
+        if (!S_ISREG(status.st_mode)) {
+            Descriptor device(target, O_WRONLY);
+            if (!device) throw FileError(path, "cannot be opened: " + reason());
+            OutputFile output(path, device);
+            write(output);
+            if (!device.close()) throw FileError(path, "cannot be written: " + reason());
+            return;
+        }
     }
 
-    const TemporaryFile temporary{temporary_beside(target)};
-    write(temporary.path);
-    {
-        Descriptor written(temporary.path, O_RDONLY);
-        if (!written) throw FileError(path, "was not written: " + reason());
-        if (::fsync(written) != 0) throw FileError(path, "cannot be written to disk: " + reason());
-    }
-    if (::rename(temporary.path.c_str(), target.c_str()) != 0)
-        throw FileError(path, "cannot be replaced: " + reason());
+    remove_left_behind(target);
+    UnfinishedFile unfinished(target);
+    OutputFile output(path, unfinished.descriptor());
+    write(output);
+    unfinished.rename_to(target, path);
 
     // The rename itself lasts once its folder is on disk; a file system that cannot say so is no
     // fault.
-    const std::string folder = std::filesystem::path(target).parent_path().string();
-    const Descriptor directory(folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
+    const Descriptor directory(folder_of(target).string(), O_RDONLY | O_DIRECTORY);
     if (directory) ::fsync(directory);
 }
 
-void write_bytes(const std::string& path, std::span<const std::byte> bytes) {
-    Descriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);
-    if (!file) throw FileError(path, "cannot be created: " + reason());
-    while (!bytes.empty()) {
-        const ssize_t count = ::write(file, bytes.data(), bytes.size());
-        if (count < 0 && errno == EINTR) continue;
-        if (count <= 0) throw FileError(path, "cannot be written: " + reason());
-        bytes = bytes.subspan(static_cast<std::size_t>(count));
-    }
-    if (!file.close()) throw FileError(path, "cannot be written: " + reason());
-}
-
 void write_file(const std::string& path, std::string_view content) {
-    write_atomically(path, [&](const std::string& temporary) {
-        write_bytes(temporary, std::as_bytes(std::span(content)));
-    });
+    write_atomically(path, [&](OutputFile& file) { file.write(std::as_bytes(std::span(content))); });
 }
 
 MappedFile::MappedFile(const std::string& path) {

@@ -6,19 +6,29 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace afterglow {
 
-/// Writes a file through `write(temporary_path)` beside its target and renames it over it when that
-/// returns; on any failure nothing is left behind and a file that was there stays as it was. Throws
-/// FileError where the rename or sync fails. A symbolic link is followed; a device is written to
-/// directly. `write` must report its own errors (write_bytes() does).
-void write_atomically(const std::string& path,
-                      const std::function<void(const std::string& temporary_path)>& write);
+/// A file that is being written.
+class OutputFile {
+public:
+    /// All of it, or throws FileError: a full disk does not go unnoticed.
+    void write(std::span<const std::byte> bytes);
 
-/// Writes all bytes to a file or device, or throws FileError: a full disk does not go unnoticed.
-/// Not atomic by itself: call it inside write_atomically().
-void write_bytes(const std::string& path, std::span<const std::byte> bytes);
+private:
+    friend void write_atomically(const std::string& path, const std::function<void(OutputFile&)>& write);
+    OutputFile(std::string path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+    std::string path_; // that it will have
+    int descriptor_;
+};
+
+/// Writes a file beside its target, asks for it to be on disk (fsync) and renames it over the target; on
+/// any failure, and where the process ends early, nothing is left behind and a file that was there stays
+/// as it was. Only SIGKILL or a crash of the machine leaves what was written so far, under the name
+/// TARGET.part-PROCESS-NUMBER, and the next to write the target removes it. Throws FileError. A symbolic
+/// link is followed; a device is written to directly.
+void write_atomically(const std::string& path, const std::function<void(OutputFile&)>& write);
 
 /// Writes a file that is in memory, whole or not at all. Throws FileError.
 void write_file(const std::string& path, std::string_view content);

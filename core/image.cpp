@@ -22,6 +22,7 @@
 #include <cmath>
 #include <cstring>
 #include <half.h>
+#include <new>
 #include <span>
 
 namespace afterglow {
@@ -119,7 +120,7 @@ std::string compress_png(int width, int height, std::span<const unsigned char> r
                                                   static_cast<std::size_t>(size));
     };
     if (stbi_write_png_to_func(append, &png, width, height, 3, rgb.data(), 3 * width) == 0)
-        throw Error("not enough memory to compress the picture");
+        throw std::bad_alloc();
     return png;
 }
 
@@ -150,6 +151,8 @@ void write_image(const std::string& path, const Image& image, PixelType type,
             throw UsageError(path + ": a picture's name must end in .exr or .png");
     } catch (const Error&) {
         throw;
+    } catch (const std::bad_alloc&) {
+        throw;
     } catch (const std::exception& e) {
         throw FileError(path, std::string("cannot be encoded: ") + e.what());
     }
@@ -177,6 +180,8 @@ Image read_exr(const std::string& path) {
                 image.attributes[a.name()] = text->value();
         return image;
     } catch (const Error&) {
+        throw;
+    } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& e) {
         throw FileError(path, "cannot be read as OpenEXR: " + printable(e.what()));

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <new>
 
 namespace afterglow {
 
@@ -74,8 +75,10 @@ Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tre
     lift_ = std::max(largest * 0x1p-19f, std::numeric_limits<float>::min());
 
     tree_->device = rtcNewDevice(nullptr);
-    if (!tree_->device) throw Error("Embree cannot start on this machine");
+    if (!tree_->device)
+        throw Error("Embree cannot start; it needs some memory, and to be allowed to start threads");
     tree_->scene = rtcNewScene(tree_->device);
+    if (!tree_->scene) throw std::bad_alloc();
     rtcSetSceneBuildQuality(tree_->scene, RTC_BUILD_QUALITY_HIGH);
 
     // Triangles of their own corners, each a little larger than it is: so that no ray slips through
@@ -90,7 +93,7 @@ Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tre
                                 3 * sizeof(std::uint32_t), std::max<std::size_t>(1, count)));
     if (!vertices || !indices) {
         rtcReleaseGeometry(mesh);
-        throw Error("Embree has not enough memory for " + std::to_string(count) + " triangles");
+        throw std::bad_alloc();
     }
     const float growth = growth_share * lift_;
     parallel_for(static_cast<Index>(count), [&](Index t) {
@@ -107,9 +110,11 @@ Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tre
     rtcAttachGeometry(tree_->scene, mesh);
     rtcReleaseGeometry(mesh);
     rtcCommitScene(tree_->scene);
-    if (const RTCError error = rtcGetDeviceError(tree_->device); error != RTC_ERROR_NONE)
+    const RTCError error = rtcGetDeviceError(tree_->device);
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+    if (error != RTC_ERROR_NONE)
         throw Error("Embree cannot build its tree over " + std::to_string(scene.triangles.size())
-                    + " triangles (error " + std::to_string(error) + ")");
+                    + " triangles (error " + std::to_string(error) + "); is there enough memory?");
 }
 
 Surface::~Surface() = default;

@@ -2,6 +2,7 @@
 
 #include "core/camera.h"
 #include "core/error.h"
+#include "core/process_end.h"
 #include "core/sampling.h"
 #include "core/seconds.h"
 #include "transport/display.h"
@@ -13,6 +14,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <unistd.h>
 
 namespace afterglow {
 namespace {
@@ -149,6 +151,7 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     point.coarse_radius = transfer.points.spacing[0];
 
     const std::string file = folder_ + "/chart.safetensors";
+    const AtEarlyEnd at_early_end([&] { ::unlink(file.c_str()); });
     save_transfer(file, transfer, {AFTERGLOW_VERSION, surface_.scene().name, "", seed_, "{}", "{}"});
     point.bytes = std::filesystem::file_size(file);
     std::filesystem::remove(file);

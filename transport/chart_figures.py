@@ -59,7 +59,9 @@ def finish(figure, name, about):
                 f"Afterglow {chart['version']}", fontsize=6, color="#555555")
     figure.tight_layout(rect=(0, 0.03, 1, 1))
     for ending in ("svg", "png"):
-        figure.savefig(folder / f"{name}.{ending}", dpi=150, metadata={"Date": None} if ending == "svg" else None)
+        unfinished = folder / f"{name}.part.{ending}"
+        figure.savefig(unfinished, dpi=150, metadata={"Date": None} if ending == "svg" else None)
+        unfinished.replace(folder / f"{name}.{ending}")
     plt.close(figure)
 
 

@@ -249,7 +249,8 @@ void add_chart_command(CLI::App& app) {
     sub->add_option("--sweeps", command->sweeps,
                     "Some of them alone, or a value of one (target=0.1): spacing, target, path, paper, dense, flat, "
                     "rays, receiver_levels, sender_levels, threshold, bounces")
-        ->delimiter(',');
+        ->delimiter(',')
+        ->type_name("SWEEP,...");
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);
     sub->callback([command] { run(*command); });

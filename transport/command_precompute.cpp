@@ -3,8 +3,10 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/parallel.h"
+#include "core/process_end.h"
 #include "core/progress.h"
 #include "core/sampling.h"
+#include "transport/checkpoint.h"
 #include "transport/cli_options.h"
 #include "transport/error_parts.h"
 #include "transport/precompute.h"
@@ -37,9 +39,10 @@ constexpr float draft_scale = 3.0f;
 constexpr int draft_rays = 128;
 
 struct PrecomputeCommand {
-    std::string scene, output, report, operator_name = "neumann";
+    std::string scene, output, report, checkpoint, operator_name = "neumann";
     double target_error = LinkOptions().target_error, epsilon = 0.0, coarse_radius = 0.0;
     double max_time = 0.0, max_memory = 0.0; // [s], [GB]; 0: no limit
+    double checkpoint_every = 10.0;          // [s]
     PrecomputeOptions options;
     bool draft = false, tuned = false, no_verification = false;
     RunOptions run;
@@ -253,9 +256,21 @@ void print_tuning(const PrecomputeCommand& command, const TuningReport& tuning,
                      100.0 * command.target_error, reason);
 }
 
+/// Says so where there is something to go on from.
+void open_checkpoint(const PrecomputeCommand& command, TransferProvenance asked,
+                     std::optional<Checkpoint>& checkpoint) {
+    // The options of a file do not tell a search from one step.
+    if (command.tuned) asked.options = Json{{"search", Json::parse(asked.options)}}.dump();
+    checkpoint.emplace(command.checkpoint, std::move(asked), command.checkpoint_every);
+    if (checkpoint->found() && !command.run.quiet)
+        std::fprintf(stderr, "%s: the links of %u of %u functions are there already\n", command.checkpoint.c_str(),
+                     checkpoint->found()->done, checkpoint->found()->transfer.points.size());
+}
+
 void run(PrecomputeCommand& command) {
     check_output(command.output);
     if (!command.report.empty()) check_output(command.report);
+    if (!command.checkpoint.empty()) check_output(command.checkpoint);
     const ThreadLimit limit(command.run.threads);
     OuterSeconds outer;
     const auto start = Clock::now();
@@ -266,6 +281,16 @@ void run(PrecomputeCommand& command) {
         std::fprintf(stderr, "%s: %s\n", command.scene.c_str(), line.c_str());
     const Surface surface(scene);
     outer.tree = lap(time);
+    const Json options = options_json(command);
+    const TransferProvenance asked = {AFTERGLOW_VERSION, command.scene, scene.content_hash(),
+                                      command.options.seed, options.dump()};
+    std::optional<Checkpoint> checkpoint;
+    std::optional<AtEarlyEnd> advice;
+    if (!command.checkpoint.empty()) {
+        open_checkpoint(command, asked, checkpoint);
+        command.options.checkpoint = &*checkpoint;
+        advice.emplace([] {}, "the same command goes on from " + command.checkpoint);
+    }
 
     PrecomputeReport report;
     TuningReport tuning;
@@ -276,19 +301,19 @@ void run(PrecomputeCommand& command) {
     if (!command.no_verification) verified = verify(surface, transfer, report, command.options);
     outer.verification = lap(time);
     const LinkCounts links(transfer);
-    const Json options = options_json(command);
     const Json statistics = statistics_json(transfer, report, links, verified, tuning);
-    const std::string hash = scene.content_hash();
-    save_transfer(command.output, transfer,
-                  {AFTERGLOW_VERSION, command.scene, hash, command.options.seed, options.dump(),
-                   statistics.dump()});
+    TransferProvenance provenance = asked;
+    provenance.statistics = statistics.dump();
+    save_transfer(command.output, transfer, provenance);
+    advice.reset();
+    if (checkpoint) checkpoint->remove();
     outer.write = lap(time);
     outer.total = std::chrono::duration<double>(time - start).count();
 
     if (!command.report.empty()) {
         const Json json = {{"version", AFTERGLOW_VERSION},
                            {"scene", command.scene},
-                           {"scene_hash", hash},
+                           {"scene_hash", asked.scene_hash},
                            {"triangles", scene.triangles.size()},
                            {"threads", thread_count()},
                            {"options", options},
@@ -327,6 +352,15 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     if (limited && (given("--coarse-radius") || given("--epsilon") || command.operator_name == "paper"))
         throw UsageError("--max-time and --max-memory limit the search for a spacing; give these or "
                          "--coarse-radius, --epsilon and --operator paper");
+    if (given("--checkpoint") && limited)
+        throw UsageError("--checkpoint promises the bytes of a run that is not disturbed; with --max-time and "
+                         "--max-memory they depend on the run");
+    if (given("--checkpoint") && command.operator_name == "paper")
+        throw UsageError("--operator paper is made in one go; it knows no --checkpoint");
+    if (given("--checkpoint") && (command.checkpoint == command.output || command.checkpoint == command.report))
+        throw UsageError("--checkpoint needs a file of its own");
+    if (given("--checkpoint-every") && !(command.checkpoint_every >= 0.0))
+        throw UsageError("--checkpoint-every must not be negative");
     command.tuned = limited || (given("--target-error") && !given("--coarse-radius"));
     if (command.draft && (command.tuned || given("--coarse-radius")))
         throw UsageError("--draft chooses the spacing itself");
@@ -396,6 +430,15 @@ void add_precompute_command(CLI::App& app) {
         ->check(CLI::Range(0, most_bounces));
     sub->add_flag("--no-verification", command->no_verification,
                   "Do not compare with the path tracer in the end");
+    CLI::Option* checkpoint =
+        sub->add_option("--checkpoint", command->checkpoint,
+                        "File that keeps what is done until all is: after a kill the same command goes on "
+                        "from there, to the same bytes")
+            ->type_name("FILE");
+    add_number(*sub, "--checkpoint-every", command->checkpoint_every,
+               "Seconds between two checkpoints (default 10), more where they cost over a hundredth of the time; "
+               "0: whenever there is something new")
+        ->needs(checkpoint);
     sub->add_option("--report", command->report, "JSON file for counts and times")->type_name("FILE");
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);

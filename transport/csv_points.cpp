@@ -94,12 +94,7 @@ void write_irradiance_csv(const std::string& path, const Eigen::Array3Xf& irradi
             append_number(text, irradiance(c, k));
             text += c < 2 ? ',' : '\n';
         }
-    write_atomically(path, [&](const std::string& temporary) {
-        std::ofstream file(temporary, std::ios::binary);
-        file.write(text.data(), static_cast<std::streamsize>(text.size()));
-        file.close();
-        if (!file) throw FileError(path, "cannot be written");
-    });
+    write_file(path, text);
 }
 
 Eigen::Array3Xf read_irradiance_csv(const std::string& path) {

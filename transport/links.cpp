@@ -58,6 +58,15 @@ public:
         clear();
     }
 
+    /// Fills `pushed` as make() did when it stored these links of receiver i.
+    void push_again(Index i, int level, const Links& links, std::span<const PushedRow> parents, float negligible,
+                    PushedRow& pushed) {
+        if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
+        links.for_each(i, [&](std::uint32_t j, const LinkVector& d) { predicted_.at(j) += d; });
+        push_down(negligible, pushed);
+        clear();
+    }
+
     /// Whether the first samples of a receiver, a `share` of them, let expect that links will be stored.
     bool expects_links(Index i, int level, std::span<const GatherSample> samples, float share,
                        std::span<const PushedRow> parents, const LevelThresholds& thresholds) {
@@ -245,20 +254,6 @@ LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, 
     return thresholds;
 }
 
-/// Joins the rows; they are freed on the way.
-Links join(std::vector<std::vector<PackedLink>> rows) {
-    std::vector<std::uint64_t> begin{0};
-    for (const auto& row : rows)
-        begin.push_back(begin.back() + row.size());
-    std::vector<PackedLink> entry;
-    entry.reserve(begin.back());
-    for (auto& row : rows) {
-        entry.insert(entry.end(), row.begin(), row.end());
-        std::vector<PackedLink>().swap(row);
-    }
-    return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
-}
-
 /// Of a receiver of a level; see LinkOptions.
 int gather_rays(const LinkOptions& options, const PointHierarchy& points, int level) {
     const double ratio = std::max(1.0f, points.spacing[level] / points.spacing.back());
@@ -292,9 +287,22 @@ GatherDirections gather_directions(const LinkOptions& options, const PointHierar
     return {gather_rays(options, points, level), hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
 
+Links join_links(std::vector<std::vector<PackedLink>> rows) {
+    std::vector<std::uint64_t> begin{0};
+    for (const auto& row : rows)
+        begin.push_back(begin.back() + row.size());
+    std::vector<PackedLink> entry;
+    entry.reserve(begin.back());
+    for (auto& row : rows) {
+        entry.insert(entry.end(), row.begin(), row.end());
+        std::vector<PackedLink>().swap(row);
+    }
+    return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
+}
+
 Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
                  const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
-                 LinkStatistics& statistics) {
+                 LinkStatistics& statistics, const LinkResumption& resumption) {
     constexpr Index samples_at_once = 1 << 20, grain = 16;
     std::vector<std::vector<PackedLink>> done(points.size());
     std::vector<PushedRow> parents, pushed;
@@ -324,6 +332,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
             std::vector<std::uint32_t> receivers(static_cast<std::size_t>(end - begin));
             std::iota(receivers.begin(), receivers.end(), static_cast<std::uint32_t>(begin));
             samples.resize(receivers.size() * static_cast<std::size_t>(count));
+            rays_begun += static_cast<double>(samples.size());
             const auto samples_of = [&](Index r, RayRange range) {
                 return std::span(samples).subspan(static_cast<std::size_t>(r * count + range.first),
                                                   static_cast<std::size_t>(range.count));
@@ -356,6 +365,17 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
                 });
                 statistics.links_seconds += seconds_since(start);
             };
+            if (end <= static_cast<Index>(resumption.done)) {
+                for_each_receiver([&](RowMaker& maker, Index r) {
+                    const Index i = receivers[r];
+                    const auto row = resumption.links.row(i);
+                    done[i].assign(row.begin(), row.end());
+                    if (thresholds.has_children)
+                        maker.push_again(i, l, resumption.links, parents, thresholds.negligible,
+                                         pushed[i - points.begin(l)]);
+                });
+                continue;
+            }
             trace({0, first_count});
             if (first_count < count) {
                 std::vector<char> wanted(receivers.size());
@@ -382,13 +402,13 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
             });
             for (const std::uint64_t of_receiver : links_before)
                 statistics.links_before += of_receiver;
-            rays_begun += static_cast<double>(samples.size());
             if (options.progress) options.progress(rays_begun / all_rays);
+            if (resumption.pause) resumption.pause(static_cast<std::uint32_t>(end), done);
         }
     }
     statistics.patches = rows.made();
     statistics.uncovered_patches = rows.uncovered();
-    return join(std::move(done));
+    return join_links(std::move(done));
 }
 
 } // namespace afterglow

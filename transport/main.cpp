@@ -1,4 +1,3 @@
-#include "core/error.h"
 #include "transport/command_chart.h"
 #include "transport/command_compare.h"
 #include "transport/command_info.h"
@@ -8,11 +7,9 @@
 #include "transport/command_render.h"
 #include "transport/manual.h"
 #include "transport/processor.h"
+#include "transport/program.h"
 
 #include <CLI/CLI.hpp>
-
-#include <cstdio>
-#include <exception>
 
 namespace {
 
@@ -40,21 +37,5 @@ int main(int argc, char** argv) {
     afterglow::add_reference_command(app);
     afterglow::add_compare_command(app);
     afterglow::add_chart_command(app);
-
-    const auto fail = [](const std::exception& error, int status, const char* remedy = "") {
-        std::fprintf(stderr, "afterglow: %s%s\n", error.what(), remedy);
-        return status;
-    };
-    try {
-        app.parse(argc, argv);
-        return 0;
-    } catch (const CLI::Success& help) {
-        return app.exit(help);
-    } catch (const CLI::ParseError& error) {
-        return fail(error, 2, "; see --help");
-    } catch (const afterglow::UsageError& error) {
-        return fail(error, 2);
-    } catch (const std::exception& error) {
-        return fail(error, 1);
-    }
+    return afterglow::run_program(app, argc, argv);
 }

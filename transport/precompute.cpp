@@ -3,6 +3,7 @@
 #include "basis/poisson_disk.h"
 #include "core/error.h"
 #include "core/seconds.h"
+#include "transport/checkpoint.h"
 #include "transport/paper_links.h"
 #include "transport/paper_series.h"
 
@@ -60,20 +61,41 @@ HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSo
     return hierarchy;
 }
 
-void make_neumann(const Surface& surface, const LinkOptions& links, TransferOperator& transfer,
-                  PrecomputeReport& report) {
+/// Goes on from `begun` where that is given: then of `transfer`, all but the links is there.
+void make_neumann(const Surface& surface, const LinkOptions& links, Checkpoint* checkpoint,
+                  const Checkpoint::State* begun, TransferOperator& transfer, PrecomputeReport& report) {
     auto start = Clock::now();
     const ShepardBasis basis(transfer.points, surface, true);
-    transfer.push = make_push_operator(basis);
+    if (!begun) transfer.push = make_push_operator(basis);
     report.push_seconds = seconds_since(start);
 
     start = Clock::now();
     SenderRows rows(surface, basis, transfer.sender_levels);
     rows.see(arrivals(surface, transfer.points, links.seed));
-    transfer.pull = rows.make_pull_operator();
+    LinkResumption resumption;
+    if (begun) {
+        if (!begun->made_rows.empty() && std::ranges::max(begun->made_rows) >= rows.count())
+            throw FileError(checkpoint->path(), "names sender rows that are not there");
+        rows.require(begun->made_rows);
+        resumption.done = begun->done;
+        resumption.links = transfer.links;
+    } else {
+        transfer.pull = rows.make_pull_operator();
+    }
     report.pull_seconds = seconds_since(start);
+    if (checkpoint) {
+        const auto save = [&](std::uint32_t done, const std::vector<std::vector<PackedLink>>& of_receivers) {
+            transfer.links = join_links(of_receivers);
+            transfer.sender_areas.assign(transfer.senders() - transfer.points.begin(transfer.sender_levels - 1), 0.0f);
+            checkpoint->save(transfer, done, rows.made_numbers(), report);
+        };
+        if (!begun) save(0, std::vector<std::vector<PackedLink>>(transfer.points.size()));
+        resumption.pause = [=](std::uint32_t done, const std::vector<std::vector<PackedLink>>& of_receivers) {
+            if (checkpoint->is_due()) save(done, of_receivers);
+        };
+    }
     transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,
-                                report.links);
+                                report.links, resumption);
     transfer.sender_areas = rows.finest_areas();
 }
 
@@ -134,19 +156,25 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     PrecomputeReport& r = report ? *report : local;
     const auto start = Clock::now();
 
-    r.viewpoints = options.viewpoint ? std::vector<Vec3>{*options.viewpoint}
-                                     : find_viewpoints(surface, options.seed);
-    CandidateSource source(surface, r.viewpoints, options.seed);
-    r.mean_ray_length = source.mean_ray_length();
-
     TransferOperator transfer;
-    transfer.kind = options.kind;
-    transfer.sender_levels = options.sender_levels;
-    transfer.bounces = options.bounces;
-    transfer.points =
-        build_hierarchy(source, hierarchy_options(options, source), &r.hierarchy);
+    std::optional<Checkpoint::State> begun;
+    if (options.checkpoint) begun = options.checkpoint->take(options.coarse_scale);
+    if (begun) {
+        r = begun->report;
+        transfer = std::move(begun->transfer);
+    } else {
+        r.viewpoints = options.viewpoint ? std::vector<Vec3>{*options.viewpoint}
+                                         : find_viewpoints(surface, options.seed);
+        CandidateSource source(surface, r.viewpoints, options.seed);
+        r.mean_ray_length = source.mean_ray_length();
+        transfer.kind = options.kind;
+        transfer.sender_levels = options.sender_levels;
+        transfer.bounces = options.bounces;
+        transfer.points =
+            build_hierarchy(source, hierarchy_options(options, source), &r.hierarchy);
+        r.points_rays = source.rays();
+    }
     r.points_seconds = seconds_since(start);
-    r.points_rays = source.rays();
 
     LinkOptions links = options.links;
     links.seed = options.seed;
@@ -157,7 +185,7 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
     if (options.kind == OperatorKind::paper)
         make_paper(surface, links, transfer, r);
     else
-        make_neumann(surface, links, transfer, r);
+        make_neumann(surface, links, options.checkpoint, begun ? &*begun : nullptr, transfer, r);
     r.total_seconds = seconds_since(start);
     return transfer;
 }

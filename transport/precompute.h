@@ -11,6 +11,8 @@
 
 namespace afterglow {
 
+class Checkpoint;
+
 struct PrecomputeOptions {
     OperatorKind kind = OperatorKind::neumann;
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
@@ -30,6 +32,8 @@ struct PrecomputeOptions {
     std::uint64_t seed = 1;
     /// Is told from time to time which share of the work is done, roughly by time.
     std::function<void(double)> progress = {};
+    /// Where to save what is done, and to go on from; not of OperatorKind::paper.
+    Checkpoint* checkpoint = nullptr;
 
     /// For OperatorKind::paper, as printed [LZT08, secs. 2.3 and 4.2]: three levels of senders, four
     /// bounces, epsilon .025 (of links without our 1/pi). All receivers are on regular levels; of

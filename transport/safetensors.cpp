@@ -7,9 +7,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -329,19 +327,9 @@ void write_safetensors(const std::string& path, std::span<const Tensor> tensors,
     assert(writable(tensors, metadata));
     const std::vector<Tensor> padded = with_padding(tensors);
     const std::string header = make_header(path, padded, metadata);
-    write_atomically(path, [&](const std::string& temporary_path) {
-        std::ofstream out(temporary_path, std::ios::binary);
-        const auto write = [&](const void* bytes, std::size_t count) {
-            out.write(static_cast<const char*>(bytes), static_cast<std::streamsize>(count));
-        };
-        errno = 0;
-        write(header.data(), header.size());
-        for (const Tensor& tensor : padded)
-            write(tensor.bytes.data(), tensor.bytes.size());
-        out.close();
-        if (!out)
-            throw FileError(path, std::string("cannot be written: ") + std::strerror(errno)
-                                      + "; free some space or choose another folder");
+    write_atomically(path, [&](OutputFile& file) {
+        file.write(std::as_bytes(std::span(header)));
+        for (const Tensor& tensor : padded) file.write(tensor.bytes);
     });
 }
 

@@ -245,6 +245,13 @@ PullOperator SenderRows::make_pull_operator() {
     return {join_rows(std::move(rows))};
 }
 
+std::vector<std::uint32_t> SenderRows::made_numbers() const {
+    std::vector<std::uint32_t> numbers;
+    for (std::uint32_t n = 0; n < place_.size(); ++n)
+        if (is_made(n)) numbers.push_back(n);
+    return numbers;
+}
+
 std::vector<float> SenderRows::finest_areas() const {
     const int finest = levels() - 1;
     const PatchGrid& grid = grid_.back();

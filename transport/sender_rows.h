@@ -64,6 +64,8 @@ public:
     std::vector<float> finest_areas() const;
 
     std::size_t made() const { return made_; }
+    std::vector<std::uint32_t> made_numbers() const; // rising
+    std::uint32_t count() const { return static_cast<std::uint32_t>(place_.size()); } // of all, made or not
     std::size_t uncovered() const { return uncovered_; } // rows that are empty
 
 private:

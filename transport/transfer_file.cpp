@@ -18,7 +18,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr const char* format_name = "afterglow transfer";
 constexpr const char* format_version = "4";
 
 static_assert(sizeof(PackedLink) == 3, "links are mapped as rows of three bytes");
@@ -71,7 +70,7 @@ std::string model_text(const TransferOperator& transfer) {
 /// Takes a file's tensors and metadata into a TransferOperator, trusting nothing.
 class Reader {
 public:
-    explicit Reader(const SafetensorsFile& file) : file_(file) {}
+    Reader(const SafetensorsFile& file, const std::string& format) : file_(file), format_(format) {}
 
     void read(TransferFile& result) {
         check_format();
@@ -98,7 +97,7 @@ private:
     }
 
     void check_format() const {
-        if (file_.metadata("format") != format_name) fail("is not a transfer file of afterglow");
+        if (file_.metadata("format") != format_) throw FileError(file_.path(), "is no file of the format " + format_);
         const std::string& version = file_.metadata("format_version");
         if (version != format_version)
             fail("has another format version than " + std::string(format_version)
@@ -323,6 +322,7 @@ private:
     }
 
     const SafetensorsFile& file_;
+    const std::string& format_;
 };
 
 template <class Scalar, int Rows, int Columns>
@@ -333,7 +333,8 @@ std::span<const Scalar> values_of(const Eigen::Matrix<Scalar, Rows, Columns>& ma
 } // namespace
 
 void save_transfer(const std::string& path, const TransferOperator& transfer,
-                   const TransferProvenance& provenance) {
+                   const TransferProvenance& provenance, const std::string& format,
+                   const std::vector<Tensor>& further) {
     const PointHierarchy& points = transfer.points;
     const std::uint64_t count = points.size(), levels = points.spacing.size();
     std::vector<Tensor> tensors;
@@ -372,8 +373,9 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
                       sizeof(PackedLink) * links.entries()));
     }
 
+    tensors.insert(tensors.end(), further.begin(), further.end());
     write_safetensors(path, tensors,
-                      {{"format", format_name},
+                      {{"format", format},
                        {"format_version", format_version},
                        {"version", provenance.version},
                        {"scene", stored_scene_path(path, provenance.scene)},
@@ -384,10 +386,10 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
                        {"statistics", provenance.statistics}});
 }
 
-TransferFile load_transfer(const std::string& path) {
+TransferFile load_transfer(const std::string& path, const std::string& format) {
     const SafetensorsFile file(path);
     TransferFile result;
-    Reader(file).read(result);
+    Reader(file, format).read(result);
     return result;
 }
 

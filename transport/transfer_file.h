@@ -1,5 +1,6 @@
 #pragma once
 
+#include "transport/safetensors.h"
 #include "transport/transfer_operator.h"
 
 #include <cstdint>
@@ -26,14 +27,19 @@ struct TransferFile {
     std::vector<std::pair<std::string, std::uint64_t>> tensor_bytes; // by name, in the file's order
 };
 
+inline constexpr const char* transfer_format = "afterglow transfer"; // of operators that are finished
+
 /// Writes the file that docs/transfer-format.md describes; it appears whole or not at all. The
-/// scene's path is kept relative to the file's folder. Throws FileError.
+/// scene's path is kept relative to the file's folder. Throws FileError. A file of another `format` may hold
+/// further tensors.
 void save_transfer(const std::string& path, const TransferOperator& transfer,
-                   const TransferProvenance& provenance);
+                   const TransferProvenance& provenance, const std::string& format = transfer_format,
+                   const std::vector<Tensor>& further = {});
 
 /// Maps a file and checks everything that the computation relies on: sizes, offsets, sorted indices
-/// in range, finite values, unit normals. Takes one pass over the file. Throws FileError.
-TransferFile load_transfer(const std::string& path);
+/// in range, finite values, unit normals. Takes one pass over the file. Throws FileError, also where the
+/// file is of another format.
+TransferFile load_transfer(const std::string& path, const std::string& format = transfer_format);
 
 /// The scene that a file was made from: from `override_path` where that is not empty, else from
 /// where the file says. Throws FileError where it is not there or its content has changed.

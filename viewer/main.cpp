@@ -3,13 +3,11 @@
 #include "transport/cli_options.h"
 #include "transport/manual.h"
 #include "transport/processor.h"
+#include "transport/program.h"
 #include "viewer/headless.h"
 #include "viewer/viewer_app.h"
 
 #include <CLI/CLI.hpp>
-
-#include <cstdio>
-#include <exception>
 
 namespace {
 
@@ -105,21 +103,5 @@ int main(int argc, char** argv) {
     add_manual_options(app, manual);
     ViewCommand command;
     add_options(app, command);
-    const auto fail = [](const std::exception& error, int status, const char* remedy = "") {
-        std::fprintf(stderr, "afterglow-view: %s%s\n", error.what(), remedy);
-        return status;
-    };
-    try {
-        app.parse(argc, argv);
-        run(command);
-        return 0;
-    } catch (const CLI::Success& help) {
-        return app.exit(help);
-    } catch (const CLI::ParseError& error) {
-        return fail(error, 2, "; see --help");
-    } catch (const UsageError& error) {
-        return fail(error, 2);
-    } catch (const std::exception& error) {
-        return fail(error, 1);
-    }
+    return run_program(app, argc, argv, [&] { run(command); });
 }

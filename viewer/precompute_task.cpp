@@ -63,11 +63,13 @@ PrecomputeTask::PrecomputeTask(const std::string& scene, const std::string& file
 }
 
 PrecomputeTask::~PrecomputeTask() {
-    if (state_ == State::at_work) {
-        kill(process_, SIGTERM);
-        waitpid(process_, nullptr, 0);
-    }
+    stop();
+    if (state_ == State::at_work) waitpid(process_, nullptr, 0);
     close(output_);
+}
+
+void PrecomputeTask::stop() {
+    if (process_ > 0 && state_ == State::at_work) kill(process_, SIGTERM);
 }
 
 double PrecomputeTask::seconds() const { return now() - start_; }

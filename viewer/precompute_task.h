@@ -1,5 +1,7 @@
 #pragma once
 
+#include "core/process_end.h"
+
 #include <string>
 #include <sys/types.h>
 
@@ -32,7 +34,9 @@ private:
     pid_t process_ = -1;
     int output_ = -1;
     State state_ = State::at_work;
+    AtEarlyEnd at_early_end_{[this] { stop(); }};
 
+    void stop();
     void read_output();
 };
 

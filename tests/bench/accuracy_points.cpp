@@ -96,13 +96,7 @@ void write(const std::string& path, const AccuracyReference& reference, const Js
                     text << ',' << (*kind)(c, static_cast<Index>(p) * light_count + l);
         text << '\n';
     }
-    const std::string bytes = text.str();
-    write_atomically(path, [&](const std::string& temporary) {
-        std::ofstream file(temporary, std::ios::binary);
-        file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-        file.close();
-        if (!file) throw FileError(path, "cannot be written");
-    });
+    write_file(path, text.str());
 }
 
 AccuracyReference read(const std::string& path) {

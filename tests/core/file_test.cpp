@@ -16,8 +16,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 }
 
 void write_text(const std::string& path, const std::string& text) {
-    write_atomically(path,
-                     [&](const std::string& temporary) { write_bytes(temporary, bytes_of(text)); });
+    write_atomically(path, [&](OutputFile& file) { file.write(bytes_of(text)); });
 }
 
 /// Files of this process may not grow beyond some bytes, as if the disk were full.
@@ -51,8 +50,8 @@ TEST(WriteAtomically, KeepsTheOldFileWhereTheWriterThrows) {
     const TemporaryFolder folder;
     const std::string path = folder.write("a.txt", "old");
     EXPECT_THROW(write_atomically(path,
-                                  [](const std::string& temporary) {
-                                      std::ofstream(temporary) << "half of it";
+                                  [](OutputFile& file) {
+                                      file.write(bytes_of("half of it"));
                                       throw std::runtime_error("out of ideas");
                                   }),
                  std::runtime_error);
@@ -90,8 +89,32 @@ TEST(WriteAtomically, RefusesAFolderAndAMissingFolder) {
     const TemporaryFolder folder;
     EXPECT_THROW(write_text(folder.path(""), "text"), FileError);
     EXPECT_THROW(write_text(folder.path("none/a.txt"), "text"), FileError);
-    EXPECT_THROW(write_atomically(folder.path("b.txt"), [](const std::string&) {}), FileError);
     EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST(WriteAtomically, RemovesWhatAKilledProcessLeftOfItsTargetAlone) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path("a.txt");
+    folder.write("a.txt.part-123-0", "half of it");
+    folder.write("b.txt.part-123-0", "another target's");
+    folder.write("a.txt.part-of-mine", "somebody's own file");
+    write_text(path, "new");
+    EXPECT_EQ(content_of(path), "new");
+    EXPECT_FALSE(std::filesystem::exists(folder.path("a.txt.part-123-0")));
+    EXPECT_EQ(folder.count(), 3u);
+}
+
+TEST(WriteAtomically, TwoAtATimeDoNotDisturbEachOther) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path("a.txt");
+    write_atomically(path, [&](OutputFile& outer) {
+        outer.write(bytes_of("outer"));
+        write_text(path, "inner");
+        EXPECT_EQ(content_of(path), "inner");
+        outer.write(bytes_of(", still there"));
+    });
+    EXPECT_EQ(content_of(path), "outer, still there");
+    EXPECT_EQ(folder.count(), 1u);
 }
 
 TEST(MappedFile, ShowsTheBytesOfAFile) {

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <string>
+#include <unistd.h>
 
 // precompute, and the commands that use what it made.
 
@@ -156,10 +158,103 @@ TEST_F(CommandTransfer, AFullDiskIsStatusOneAndLeavesTheOldFile) {
     // Writing beyond the limit of file sizes fails as on a full disk; in blocks of 512 or 1024
     // bytes.
     expect_failure(run("precompute builtin:cornell --quiet -o" + quoted(path) + small_settings,
-                       "trap '' XFSZ; ulimit -f 20; "),
+                       "ulimit -f 20; "),
                    1);
     EXPECT_EQ(content_of(path), "old");
     EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST_F(CommandTransfer, ResultsThatCannotBePrintedAreStatusOne) {
+    for (const std::string stream : {">/dev/full", ">&-"})
+        for (const std::string& command : {"info" + quoted(file()), "info --json" + quoted(file()), std::string("--help")}) {
+            SCOPED_TRACE(command + stream);
+            const Outcome outcome = run(command, "with_stream() { \"$@\" " + stream + "; }; with_stream ");
+            expect_failure(outcome, 1);
+            EXPECT_NE(outcome.err.find("standard output"), std::string::npos) << outcome.err;
+        }
+}
+
+TEST_F(CommandTransfer, ClosedStreamsDoNotEndUpInTheFile) {
+    const std::string path = folder.path("t");
+    const Outcome made = run("precompute builtin:cornell -o" + quoted(path) + small_settings,
+                             "closed() { \"$@\" <&- >&- 2>&-; }; closed ");
+    EXPECT_EQ(made.status, 0);
+    EXPECT_EQ(content_of(path), content_of(file()));
+}
+
+TEST_F(CommandTransfer, AFolderThatTakesNoFilesIsStatusOne) {
+    if (!std::filesystem::is_directory("/proc/self")) GTEST_SKIP() << "no /proc here";
+    expect_failure(run("precompute builtin:cornell --quiet -o /proc/self/t" + small_settings), 1); // even of root
+    expect_failure(run("render" + quoted(file()) + " --quiet -o /proc/self/a.png" + light + camera), 1);
+    expect_failure(run("precompute builtin:cornell --quiet --checkpoint /proc/self/c -o" + quoted(folder.path("t"))
+                       + small_settings), 1);
+    EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST_F(CommandTransfer, AReadOnlyFolderIsStatusOneAtOnce) {
+    const std::string closed = folder.path("closed");
+    std::filesystem::create_directory(closed);
+    std::filesystem::permissions(closed, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+    if (::access(closed.c_str(), W_OK) == 0) GTEST_SKIP() << "this user may write everywhere";
+    expect_failure(run("precompute builtin:cornell --quiet -o" + quoted(closed + "/t") + small_settings), 1);
+    expect_failure(run("render" + quoted(file()) + " -o" + quoted(closed + "/a.png") + light + camera), 1);
+}
+
+TEST_F(CommandTransfer, CheckpointsOfOtherRunsAreRefusedAndThoseOfThisGoOn) {
+    const std::string checkpoint = " --checkpoint" + quoted(folder.path("c"));
+    const std::string start = "precompute builtin:cornell -o" + quoted(folder.path("t")) + checkpoint;
+    for (const char* options : {"--max-time 5", "--max-memory 1", "--operator paper", "--checkpoint-every -1"})
+        expect_failure(run(start + " " + options), 2);
+    expect_failure(run("precompute builtin:cornell -o" + quoted(folder.path("c")) + checkpoint), 2);
+    expect_failure(run("precompute builtin:cornell --checkpoint-every 1 -o" + quoted(folder.path("t"))), 2);
+    EXPECT_EQ(folder.count(), 0u);
+
+    // All goes well until the file is written.
+    folder.write("t", "old");
+    expect_failure(run("precompute builtin:cornell --quiet -o /dev/full" + checkpoint + small_settings), 1);
+    ASSERT_TRUE(std::filesystem::exists(folder.path("c")));
+    for (const char* change : {" --seed 2", " --rays 128", " --target-error 0.3"})
+        expect_failure(run(start + " --quiet" + small_settings + change), 1);
+    expect_failure(run("render" + quoted(folder.path("c")) + " -o" + quoted(folder.path("a.png")) + light + camera), 1);
+    EXPECT_EQ(content_of(folder.path("t")), "old");
+    const Outcome went_on = run(start + small_settings);
+    EXPECT_EQ(went_on.status, 0) << went_on.err;
+    EXPECT_NE(went_on.err.find("are there already"), std::string::npos) << went_on.err;
+    EXPECT_EQ(content_of(folder.path("t")), content_of(file()));
+    EXPECT_EQ(folder.count(), 1u) << "the checkpoint is gone";
+}
+
+TEST_F(CommandTransfer, AnEditedMaterialOrTextureIsRefusedByEveryCommand) {
+    const auto write_material = [&](const std::string& colour) {
+        folder.write("a.mtl", "newmtl m\nKd " + colour + "\nmap_Kd a.ppm\n");
+    };
+    folder.write("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.5 0.5\n"
+                          "f 1/1 2/1 3/1\nf 1/1 4/1 3/1\nf 1/1 2/1 4/1\n");
+    folder.write("p.csv", "0.1,0,0.1,0,1,0\n");
+    write_material("0.5 0.5 0.5");
+    folder.write("a.ppm", "P6\n1 1\n255\nabc");
+    ASSERT_EQ(run("precompute" + quoted(folder.path("a.obj")) + " --quiet --viewpoint 0.3,0.3,0.3 -o"
+                  + quoted(folder.path("t")) + small_settings).status, 0);
+    const std::string render = "render" + quoted(folder.path("t")) + " --quiet -o" + quoted(folder.path("a.png")) + light + camera;
+    const std::string query = "query" + quoted(folder.path("t")) + " --points" + quoted(folder.path("p.csv")) + " -o"
+                              + quoted(folder.path("e.csv")) + light;
+    const auto expect_refusal = [&](const char* what) {
+        SCOPED_TRACE(what);
+        for (const std::string& command : {render, query}) {
+            const Outcome outcome = run(command);
+            expect_failure(outcome, 1);
+            EXPECT_NE(outcome.err.find("content hash"), std::string::npos) << outcome.err;
+        }
+    };
+    write_material("0.5 0.5 0.6");
+    expect_refusal("the material");
+    write_material("0.5 0.5 0.5");
+    folder.write("a.ppm", "P6\n1 1\n255\nabd");
+    expect_refusal("the texture");
+    std::filesystem::remove(folder.path("a.ppm"));
+    expect_refusal("a texture that is gone");
+    folder.write("a.ppm", "P6\n1 1\n255\nabc");
+    EXPECT_EQ(run(query).status, 0) << "all is as it was";
 }
 
 TEST_F(CommandTransfer, RenderMakesEachLayerWithItsProvenance) {

@@ -1,0 +1,86 @@
+#include "core/file.h"
+#include "core/process_end.h"
+#include "tests/support/temporary_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <csignal>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <unistd.h>
+
+namespace afterglow {
+namespace {
+
+/// Half of a file, and no more of it for a minute.
+void write_half(const std::string& path, int signal) {
+    prepare_process("writer");
+    const AtEarlyEnd note([] {}, "so it was");
+    write_atomically(path, [&](OutputFile& file) {
+        file.write(std::as_bytes(std::span("half of it", 10)));
+        std::raise(signal);
+        std::this_thread::sleep_for(std::chrono::minutes(1));
+    });
+}
+
+// Death tests in processes that are forked: they share the folder.
+
+TEST(EarlyEnd, BySignalSaysSoAndLeavesNoUnfinishedFile) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a", "old");
+    EXPECT_EXIT(write_half(path, SIGINT), ::testing::ExitedWithCode(130), "^writer: interrupted; so it was\n$");
+    EXPECT_EXIT(write_half(path, SIGTERM), ::testing::ExitedWithCode(143), "^writer: ended by SIGTERM; so it was\n$");
+    EXPECT_EXIT(write_half(path, SIGHUP), ::testing::ExitedWithCode(129), "^writer: ended by SIGHUP; so it was\n$");
+    EXPECT_EQ(content_of(path), "old");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(EarlyEnd, AfterSigkillTheUnfinishedFileGoesWithTheNextOne) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path("a");
+    EXPECT_EXIT(write_half(path, SIGKILL), ::testing::KilledBySignal(SIGKILL), "");
+    EXPECT_FALSE(std::filesystem::exists(path));
+    EXPECT_EQ(folder.count(), 1u);
+    write_file(path, "new");
+    EXPECT_EQ(content_of(path), "new");
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(EarlyEnd, DoesNotFollowASignalThatIsIgnoredFromTheStart) {
+    EXPECT_EXIT(
+        {
+            std::signal(SIGHUP, SIG_IGN);
+            prepare_process("patient");
+            std::raise(SIGHUP);
+            std::_Exit(7);
+        },
+        ::testing::ExitedWithCode(7), "");
+}
+
+TEST(EarlyEnd, ByAnExceptionThatLeavesAThreadIsOneLineAndStatusOne) {
+    const auto throw_in_thread = [](auto exception) {
+        prepare_process("thrower");
+        std::thread([&] { throw exception; }).join();
+    };
+    EXPECT_EXIT(throw_in_thread(std::bad_alloc()), ::testing::ExitedWithCode(1), "^thrower: there is not enough memory");
+    EXPECT_EXIT(throw_in_thread(std::runtime_error("out of ideas")), ::testing::ExitedWithCode(1),
+                "^thrower: out of ideas\n$");
+}
+
+TEST(PrepareProcess, KeepsFilesOutOfClosedStandardStreams) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path("a");
+    EXPECT_EXIT(
+        {
+            ::close(STDOUT_FILENO);
+            prepare_process("closed");
+            write_atomically(path, [](OutputFile&) { std::_Exit(::write(STDOUT_FILENO, "result", 6) < 0 ? 0 : 1); });
+        },
+        ::testing::ExitedWithCode(0), "");
+}
+
+} // namespace
+} // namespace afterglow
