@@ -16,7 +16,7 @@
 namespace afterglow {
 namespace {
 
-using Json = nlohmann::ordered_json; // keeps the order in which tensors lie in the file
+using OrderedJson = nlohmann::ordered_json; // keeps the order in which tensors lie in the file
 
 constexpr std::uint64_t alignment = 64; // a cache line, and the widest vector register
 constexpr std::uint64_t max_header_bytes =
@@ -128,7 +128,7 @@ std::string make_header(const std::string& path, const std::vector<Tensor>& tens
                         TensorMetadata metadata) {
     metadata.emplace(checksum_key, checksum_of(tensors));
     metadata.emplace(header_checksum_key, std::string(hash_digits, '0'));
-    Json json;
+    OrderedJson json;
     json[std::string(metadata_key)] = metadata;
     std::uint64_t end = 0;
     for (const Tensor& tensor : tensors) {
@@ -140,7 +140,7 @@ std::string make_header(const std::string& path, const std::vector<Tensor>& tens
     std::string header(sizeof(std::uint64_t), '\0');
     try {
         header += json.dump();
-    } catch (const Json::exception&) {
+    } catch (const OrderedJson::exception&) {
         throw FileError(path, "cannot be written: a name or a metadata string is not valid UTF-8");
     }
     header.resize(round_up(header.size()), ' ');
@@ -171,14 +171,14 @@ std::string make_header(const std::string& path, const std::vector<Tensor>& tens
 // Reading
 
 /// Takes a mapped file apart, trusting nothing.
-class Reader {
+class HeaderReader {
 public:
-    Reader(const std::string& path, std::span<const std::byte> file) : path_(path), file_(file) {}
+    HeaderReader(const std::string& path, std::span<const std::byte> file) : path_(path), file_(file) {}
 
     void read(std::vector<Tensor>& tensors, TensorMetadata& metadata) {
         split();
         check_header_checksum();
-        const Json json = parse();
+        const OrderedJson json = parse();
         metadata = read_metadata(json);
         read_tensors(json, tensors);
         const std::string checksum = take(metadata, checksum_key);
@@ -215,16 +215,16 @@ private:
             fail("is damaged: the checksum of its header does not match");
     }
 
-    Json parse() const {
+    OrderedJson parse() const {
         // The parser would keep the last of two equal keys, and build arbitrarily deep trees.
         std::array<std::set<std::string>, max_depth + 1> keys;
-        const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+        const auto watch = [&](int depth, OrderedJson::parse_event_t event, OrderedJson& parsed) {
             const auto level = static_cast<std::size_t>(depth);
-            if (event == Json::parse_event_t::object_start
-                || event == Json::parse_event_t::array_start) {
+            if (event == OrderedJson::parse_event_t::object_start
+                || event == OrderedJson::parse_event_t::array_start) {
                 if (depth >= max_depth) fail("has a header that nests too deeply");
                 keys[level + 1].clear();
-            } else if (event == Json::parse_event_t::key) {
+            } else if (event == OrderedJson::parse_event_t::key) {
                 if (!keys[level].insert(parsed.get<std::string>()).second)
                     fail("has a header that names '" + printable(parsed.get<std::string>())
                          + "' twice");
@@ -233,15 +233,15 @@ private:
             return true;
         };
         try {
-            Json json = Json::parse(header_.begin() + sizeof(std::uint64_t), header_.end(), watch);
+            OrderedJson json = OrderedJson::parse(header_.begin() + sizeof(std::uint64_t), header_.end(), watch);
             if (!json.is_object()) fail("has a header that is no JSON object");
             return json;
-        } catch (const Json::exception&) {
+        } catch (const OrderedJson::exception&) {
             fail("has a header that is not valid JSON");
         }
     }
 
-    TensorMetadata read_metadata(const Json& json) const {
+    TensorMetadata read_metadata(const OrderedJson& json) const {
         const auto entry = json.find(metadata_key);
         if (entry == json.end() || !entry->is_object()) fail("has no metadata");
         TensorMetadata metadata;
@@ -258,7 +258,7 @@ private:
         return node.mapped();
     }
 
-    void read_tensors(const Json& json, std::vector<Tensor>& tensors) const {
+    void read_tensors(const OrderedJson& json, std::vector<Tensor>& tensors) const {
         std::uint64_t end = 0;
         for (const auto& [name, entry] : json.items()) {
             if (name == metadata_key) continue;
@@ -272,14 +272,14 @@ private:
     }
 
     /// One entry of the header, whose bytes must start at `begin`, where the previous tensor ended.
-    Tensor read_tensor(const std::string& name, const Json& entry, std::uint64_t begin) const {
+    Tensor read_tensor(const std::string& name, const OrderedJson& entry, std::uint64_t begin) const {
         const std::string tensor_name = "tensor '" + printable(name) + "' ";
         if (!entry.is_object() || entry.size() != 3 || !entry.contains("dtype")
             || !entry.contains("shape") || !entry.contains("data_offsets"))
             fail(tensor_name + "needs dtype, shape and data_offsets, and nothing else");
         Tensor tensor;
         tensor.name = name;
-        const Json& dtype = entry["dtype"];
+        const OrderedJson& dtype = entry["dtype"];
         const auto known = std::find_if(dtypes.begin(), dtypes.end(), [&](const DTypeInfo& d) {
             return dtype.is_string() && dtype.get_ref<const std::string&>() == d.name;
         });
@@ -302,8 +302,8 @@ private:
         return tensor;
     }
 
-    std::vector<std::uint64_t> unsigned_list(const Json& list, const std::string& complaint) const {
-        const auto is_unsigned = [](const Json& value) { return value.is_number_unsigned(); };
+    std::vector<std::uint64_t> unsigned_list(const OrderedJson& list, const std::string& complaint) const {
+        const auto is_unsigned = [](const OrderedJson& value) { return value.is_number_unsigned(); };
         if (!list.is_array() || !std::all_of(list.begin(), list.end(), is_unsigned))
             fail(complaint);
         return list.get<std::vector<std::uint64_t>>();
@@ -335,7 +335,7 @@ void write_safetensors(const std::string& path, std::span<const Tensor> tensors,
 
 SafetensorsFile::SafetensorsFile(const std::string& path)
     : path_(path), map_(std::make_shared<const MappedFile>(path)) {
-    Reader(path_, map_->bytes()).read(tensors_, metadata_);
+    HeaderReader(path_, map_->bytes()).read(tensors_, metadata_);
 }
 
 const std::string& SafetensorsFile::metadata(const std::string& key) const {
