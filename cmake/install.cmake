@@ -41,10 +41,10 @@ foreach(library core basis transport)
         PATTERN "command_*" EXCLUDE PATTERN "cli_options.h" EXCLUDE # of the programs
         PATTERN "manual.h" EXCLUDE PATTERN "processor.h" EXCLUDE)
 endforeach()
-# Headers name each other as "core/scene.h". Both definitions must be those that the libraries were made with.
+# Headers name each other as "core/scene.h".
 target_include_directories(afterglow_core${portable} INTERFACE
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/afterglow>)
-target_compile_definitions(afterglow_core${portable} INTERFACE $<INSTALL_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
+target_compile_definitions(afterglow_core${portable} INTERFACE "$<INSTALL_INTERFACE:${portable_eigen}>")
 target_compile_features(afterglow_core${portable} INTERFACE cxx_std_20)
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/Afterglow)

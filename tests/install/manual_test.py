@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 
-manual, completion = map(pathlib.Path, sys.argv[1:3])
+manual, completion = (pathlib.Path(folder).resolve() for folder in sys.argv[1:3])
 failures = []
 
 

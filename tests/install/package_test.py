@@ -35,8 +35,8 @@ def public_headers_stand_alone(prefix, folder):
         sys.exit(f"headers are not those that are public: {headers}")
     unit = folder / "headers.cpp"
     unit.write_text("".join(f'#include "{header}"\n' for header in headers + headers) + "int main() {}\n")
-    output(compiler, "-std=c++20", "-Wall", "-Wextra", "-fsyntax-only", f"-I{root}", "-isystem", "/usr/include/eigen3",
-           "-DEIGEN_MAX_ALIGN_BYTES=16", unit)
+    output(compiler, "-std=c++20", "-Wall", "-Wextra", "-fsyntax-only", f"-I{root}",
+           *output("pkg-config", "--cflags", "eigen3").split(), unit)
     return len(headers)
 
 
