@@ -28,7 +28,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float largest_coordinate = 1e18f;   // Embree's limit; cross products still fit a float
 constexpr float largest_reflectance = 0.999f; // at one, light would bounce forever
 constexpr std::size_t index_digits = 9;       // tinyobjloader reads indices as int
 constexpr std::size_t most_indices = 999'999'999;

@@ -6,6 +6,9 @@
 
 namespace afterglow {
 
+/// Of a vertex. Embree's limit, beyond which it ends the process; cross products still fit a float.
+inline constexpr float largest_coordinate = 1e18f;
+
 /// Loads a Wavefront OBJ file with its MTL files, map_Kd textures and normal maps; lines, points and
 /// free-form surfaces are ignored. A normal map is what `norm` names, or else `map_Bump` or `bump`; the
 /// latter two are heights, times -bm, unless they look like normals (see normal_map.h). Pictures are

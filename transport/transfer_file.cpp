@@ -2,6 +2,7 @@
 
 #include "core/builtin_scenes.h"
 #include "core/error.h"
+#include "core/obj_loader.h"
 #include "core/parallel.h"
 #include "transport/safetensors.h"
 
@@ -128,11 +129,12 @@ private:
         const auto all = [](std::span<const float> values, const auto& good) {
             return std::all_of(values.begin(), values.end(), good);
         };
-        const auto finite = [](float x) { return std::isfinite(x); };
-        const auto positive = [](float x) { return x > 0.0f && std::isfinite(x); };
-        if (!all(spacing, positive)) fail("has a spacing that is not positive");
-        if (!all(position, finite)) fail("has a point at no finite position");
-        if (!all(support, positive)) fail("has a support that is not positive");
+        // Rays start at points, lifted by a share of their support.
+        const auto reachable = [](float x) { return std::abs(x) <= largest_coordinate; }; // false for NaN
+        const auto positive = [](float x) { return x > 0.0f && x <= largest_coordinate; };
+        if (!all(spacing, positive)) fail("has a spacing that is not positive or too large");
+        if (!all(position, reachable)) fail("has a point at no position that a scene can have");
+        if (!all(support, positive)) fail("has a support that is not positive or too large");
         if (!all(reflectance, [](float x) { return x >= 0.0f && x < 1.0f; }))
             fail("has a reflectance outside [0, 1)");
         const auto n = static_cast<Index>(count);

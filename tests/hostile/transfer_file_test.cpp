@@ -139,6 +139,8 @@ TEST(HostileTransferFile, NumbersThatCannotBeAreRefusedThoughTheChecksumsAreRigh
     expect_refusal({
         {"position NaN", set("points.position", 4, nan)},
         {"position infinite", set("points.position", 0, infinite)},
+        {"position beyond Embree's reach", set("points.position", 0, 1e30f)},
+        {"support beyond it", set("points.support", 3, 1e30f)},
         {"normal NaN", set("points.normal", 0, nan)},
         {"normal too long", set("points.normal", 1, 2.0f)},
         {"support zero", set("points.support", 3, 0.0f)},
