@@ -131,7 +131,7 @@ void OutputFile::write(std::span<const std::byte> bytes) {
         const ssize_t count = ::write(descriptor_, bytes.data(), bytes.size());
         if (count < 0 && errno == EINTR) continue;
         if (count <= 0)
-            throw FileError(path_, "cannot be written: " + reason() + "; make room, or name another folder");
+            throw FileError(path_, "cannot be written: " + reason() + "; free some space or choose another folder");
         bytes = bytes.subspan(static_cast<std::size_t>(count));
     }
 }

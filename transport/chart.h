@@ -67,9 +67,9 @@ struct ErrorMap {
 /// Measures settings of one scene, all with the same lights and places.
 class ChartBench {
 public:
-    /// `folder`: where a transfer file lies while its size is read. Keeps a reference to the surface.
-    /// Throws Error where hardly anything is in sight.
-    ChartBench(const Surface& surface, std::string folder, std::uint64_t seed);
+    /// `brief`: with a reference of 5 instead of 2 %. `folder`: where a transfer file lies while its size
+    /// is read. Keeps a reference to the surface. Throws Error where hardly anything is in sight.
+    ChartBench(const Surface& surface, std::string folder, bool brief, std::uint64_t seed);
     ChartPoint measure(const ChartSetting& setting) const;
     /// Of a precomputation with default settings.
     ErrorMap error_map() const;

@@ -91,18 +91,18 @@ std::string machine() {
 /// DIR/runs.json: what is measured already, and is not measured again.
 class Runs {
 public:
-    Runs(std::string folder, const RunOptions& run) : folder_(std::move(folder)) {
+    Runs(std::string folder, bool brief, const RunOptions& run) : folder_(std::move(folder)) {
         const std::string path = file();
         head_ = {{"version", AFTERGLOW_VERSION}, {"machine", machine()}, {"threads", thread_count()},
-                 {"seed", run.seed}, {"lights", chart_lights}, {"places", chart_places}};
+                 {"seed", run.seed}, {"brief", brief}, {"lights", chart_lights}, {"places", chart_places}};
         if (!std::filesystem::exists(path)) return;
         std::ifstream stream(path);
         const Json json = Json::parse(stream, nullptr, false);
         if (json.is_discarded() || !json.contains("runs") || !json["runs"].is_array())
             throw FileError(path, "is not what a chart has left here");
-        for (const char* key : {"version", "machine", "threads", "seed"})
+        for (const char* key : {"version", "machine", "threads", "seed", "brief"})
             if (json.value(key, Json()) != head_[key])
-                throw UsageError(path + " was made with another " + key + "; name another folder");
+                throw UsageError(path + " was made with another value of '" + key + "'; name another folder");
         runs_ = json["runs"];
     }
     /// The point, if it is there.
@@ -189,7 +189,7 @@ void measure_scene(const ChartCommand& command, const std::string& path, Runs& r
     if (is_done && !wants_map) return;
     const Surface surface(scene);
     if (!command.run.quiet) std::fprintf(stderr, "%s: tracing the reference\n", name.c_str());
-    ChartBench bench(surface, command.output, command.run.seed);
+    ChartBench bench(surface, command.output, command.brief, command.run.seed);
     for (const ChartSetting& setting : settings) {
         if (!runs.find(name, setting)) {
             const ChartPoint point = bench.measure(setting);
@@ -229,7 +229,7 @@ void run(const ChartCommand& command) {
     std::error_code failed;
     std::filesystem::create_directories(command.output, failed);
     if (failed) throw FileError(command.output, failed.message());
-    Runs runs(command.output, command.run);
+    Runs runs(command.output, command.brief, command.run);
     for (const std::string& scene : command.scenes) measure_scene(command, scene, runs);
     draw(command);
     if (!command.run.quiet)

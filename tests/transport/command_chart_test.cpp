@@ -45,6 +45,7 @@ TEST(CommandChart, MeasuresDrawsAndGoesOnWhereItWas) {
         EXPECT_EQ(last[key], again[key]) << key;
 
     EXPECT_EQ(run(start + " --seed 2").status, 2); // of which nothing is known here
+    EXPECT_EQ(run("chart builtin:cornell -o '" + folder.path("c") + "'").status, 2); // that is not brief
     cut["runs"][0]["scene_hash"] = "another";
     write_file(runs, cut.dump());
     const Outcome another = run(start);
@@ -58,7 +59,7 @@ TEST(CommandChart, MeasuresDrawsAndGoesOnWhereItWas) {
 
 TEST(CommandChart, MeasuresSomeSweepsAlone) {
     const TemporaryFolder folder;
-    const std::string start = "chart builtin:cornell -o '" + folder.path("c") + "' --sweeps ";
+    const std::string start = "chart builtin:cornell --brief -o '" + folder.path("c") + "' --sweeps ";
     const Outcome made = run(start + "path=4,target=0.3");
     ASSERT_EQ(made.status, 0) << made.err;
     const nlohmann::json points = nlohmann::json::parse(content_of(folder.path("c/runs.json")))["runs"];

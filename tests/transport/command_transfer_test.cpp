@@ -213,7 +213,7 @@ TEST_F(CommandTransfer, CheckpointsOfOtherRunsAreRefusedAndThoseOfThisGoOn) {
     folder.write("t", "old");
     expect_failure(run("precompute builtin:cornell --quiet -o /dev/full" + checkpoint + small_settings), 1);
     ASSERT_TRUE(std::filesystem::exists(folder.path("c")));
-    for (const char* change : {" --seed 2", " --rays 128", " --target-error 0.3"})
+    for (const char* change : {" --seed 2", " --bounces 2", " --target-error 0.3"})
         expect_failure(run(start + " --quiet" + small_settings + change), 1);
     expect_failure(run("render" + quoted(folder.path("c")) + " -o" + quoted(folder.path("a.png")) + light + camera), 1);
     EXPECT_EQ(content_of(folder.path("t")), "old");
@@ -226,13 +226,17 @@ TEST_F(CommandTransfer, CheckpointsOfOtherRunsAreRefusedAndThoseOfThisGoOn) {
 
 TEST_F(CommandTransfer, AnEditedMaterialOrTextureIsRefusedByEveryCommand) {
     const auto write_material = [&](const std::string& colour) {
-        folder.write("a.mtl", "newmtl m\nKd " + colour + "\nmap_Kd a.ppm\n");
+        folder.write("a.mtl", "newmtl m\nKd " + colour + "\nmap_Kd a.tga\n");
+    };
+    const auto write_texture = [&](const std::string& texel) {
+        using namespace std::string_literals;
+        folder.write("a.tga", "\0\0\2\0\0\0\0\0\0\0\0\0\1\0\1\0\x18\0"s + texel); // one, 24 bits
     };
     folder.write("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0.5 0.5\n"
                           "f 1/1 2/1 3/1\nf 1/1 4/1 3/1\nf 1/1 2/1 4/1\n");
     folder.write("p.csv", "0.1,0,0.1,0,1,0\n");
     write_material("0.5 0.5 0.5");
-    folder.write("a.ppm", "P6\n1 1\n255\nabc");
+    write_texture("abc");
     ASSERT_EQ(run("precompute" + quoted(folder.path("a.obj")) + " --quiet --viewpoint 0.3,0.3,0.3 -o"
                   + quoted(folder.path("t")) + small_settings).status, 0);
     const std::string render = "render" + quoted(folder.path("t")) + " --quiet -o" + quoted(folder.path("a.png")) + light + camera;
@@ -249,11 +253,11 @@ TEST_F(CommandTransfer, AnEditedMaterialOrTextureIsRefusedByEveryCommand) {
     write_material("0.5 0.5 0.6");
     expect_refusal("the material");
     write_material("0.5 0.5 0.5");
-    folder.write("a.ppm", "P6\n1 1\n255\nabd");
+    write_texture("abd");
     expect_refusal("the texture");
-    std::filesystem::remove(folder.path("a.ppm"));
+    std::filesystem::remove(folder.path("a.tga"));
     expect_refusal("a texture that is gone");
-    folder.write("a.ppm", "P6\n1 1\n255\nabc");
+    write_texture("abc");
     EXPECT_EQ(run(query).status, 0) << "all is as it was";
 }
 

@@ -15,10 +15,10 @@ struct CornellBox {
     Scene scene = make_builtin_scene("builtin:cornell");
     Surface surface{scene};
     Verifier verifier{surface, find_viewpoints(surface, 1),
-                      {.lights = 3, .places = 500, .reference_error = 0.03, .most_rays = 40'000'000, .seed = 5}};
+                      {.lights = 3, .places = 250, .reference_error = 0.05, .most_rays = 10'000'000, .seed = 5}};
 
     ErrorParts parts_of(const PrecomputeOptions& options) const {
-        return verifier.parts_of(precompute(surface, options), {.places = 500, .rays = 1024});
+        return verifier.parts_of(precompute(surface, options), {.places = 250, .rays = 512});
     }
 };
 
