@@ -213,7 +213,7 @@ TEST_F(CommandTransfer, CheckpointsOfOtherRunsAreRefusedAndThoseOfThisGoOn) {
     folder.write("t", "old");
     expect_failure(run("precompute builtin:cornell --quiet -o /dev/full" + checkpoint + small_settings), 1);
     ASSERT_TRUE(std::filesystem::exists(folder.path("c")));
-    for (const char* change : {" --seed 2", " --rays 128", " --target-error 0.3"})
+    for (const char* change : {" --seed 2", " --bounces 3", " --target-error 0.3"})
         expect_failure(run(start + " --quiet" + small_settings + change), 1);
     expect_failure(run("render" + quoted(folder.path("c")) + " -o" + quoted(folder.path("a.png")) + light + camera), 1);
     EXPECT_EQ(content_of(folder.path("t")), "old");
