@@ -143,6 +143,11 @@ VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::
     }
     for (const double w : without) spread += (w - centre) * (w - centre);
     error.standard_error = std::sqrt(spread * (groups - 1.0) / groups);
+    // Normal noise of variance s2 on an error whose square is q: the square varies by 2 s2^2 + 4 q s2.
+    const Eigen::ArrayXd variance = standard_error.cast<double>().square().colwise().mean().transpose();
+    const double of_noise = (2.0 * variance.square() + 4.0 * square.max(0.0) * variance).sum();
+    if (error.rel_rmse > 0.0)
+        error.noise_error = std::sqrt(of_noise) / static_cast<double>(places) / (mean * mean) / (2.0 * error.rel_rmse);
     return error;
 }
 
@@ -190,7 +195,9 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
             ++lit;
             shows = true;
             squares += error.rel_rmse * error.rel_rmse;
-            const double certain = std::clamp((error.rel_rmse - error.standard_error) / 0.8, 0.0, error.rel_rmse);
+            const double of_places = std::sqrt(
+                std::max(0.0, std::pow(error.standard_error, 2) - std::pow(error.noise_error, 2)));
+            const double certain = std::clamp((error.rel_rmse - of_places) / 0.8, 0.0, error.rel_rmse);
             certain_squares += certain * certain;
             certain_fourths += std::pow(certain, 4);
             variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);

@@ -39,10 +39,12 @@ struct VerifiedError {
     double rel_rmse = 0.0;       // of indirect irradiance: root mean square over the lights of each light's
                                  // relRMSE, the path tracer's own variance taken out
     double standard_error = 0.0; // of rel_rmse, over the choice of places (jackknife of 20 groups)
+    double noise_error = 0.0;    // what of standard_error the reference's noise makes; of one light
     double worst = 0.0;          // relRMSE under the light that has the largest
     int worst_light = 0;         // its number, those of the first trial first
     double certain = 0.0;        // as rel_rmse, of each light's relRMSE less what single places make of it:
-                                 // all of it where its standard error is as large, nothing below a fifth
+                                 // all of it where its standard error, less its
+                                 // noise_error, is as large; nothing where that is below a fifth
     double spread = 0.0;         // standard deviation over the lights of the squares of these
     double bias = 0.0;           // mean error over mean, under that light
     double reference_error = 0.0; // there

@@ -49,6 +49,19 @@ TEST(Verification, TakesTheReferencesNoiseOutAndKnowsItsOwnError) {
     EXPECT_NEAR(standard_error / spread, 1.0, 0.25);
 }
 
+TEST(Verification, KnowsWhatOfItsUncertaintyIsNoise) {
+    double noisy = 0.0, exact = 0.0;
+    constexpr int runs = 40;
+    for (int run = 0; run < runs; ++run) {
+        const VerifiedError e = simulated(0.1f, 0.2f, 1000, static_cast<std::uint64_t>(run));
+        noisy += e.noise_error / e.standard_error / runs;
+        exact += simulated(0.1f, 0.0f, 1000, static_cast<std::uint64_t>(run)).noise_error;
+    }
+    // Colours have noise of their own here, and share it in a reference: a root of three less uncertain.
+    EXPECT_NEAR(noisy, std::sqrt(3.0), 0.4);
+    EXPECT_EQ(exact, 0.0);
+}
+
 TEST(Verification, ACommonErrorIsBias) {
     const Eigen::Array3Xf reference = Eigen::Array3Xf::Constant(3, 40, 2.0f);
     const VerifiedError e =
