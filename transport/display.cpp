@@ -16,11 +16,7 @@ namespace {
 /// n . sum_j B_j V_j.
 Rgb dot_with(const Vec3& normal, const VectorIrradiance& field, std::span<const BasisEntry> row) {
     Rgb sum = Rgb::Zero();
-    for (const BasisEntry& entry : row) {
-        const float* v = &field[9 * static_cast<std::size_t>(entry.index)];
-        for (int c = 0; c < 3; ++c)
-            sum[c] += entry.value * (normal.x() * v[c] + normal.y() * v[3 + c] + normal.z() * v[6 + c]);
-    }
+    for (const BasisEntry& entry : row) sum += entry.value * net_irradiance(field, entry.index, normal);
     return sum;
 }
 

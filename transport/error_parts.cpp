@@ -121,11 +121,7 @@ ErrorParts error_parts(const Surface& surface, const TransferOperator& transfer,
             bool covered = false;
             receivers[k] += square(display.net_irradiance(x, v, covered) - here.mean.col(column), here.variance.col(column));
             if (!has_next) continue;
-            Rgb own;
-            for (int c = 0; c < 3; ++c) {
-                const float* of_point = &v[9 * std::size_t{next->index} + static_cast<std::size_t>(c)];
-                own[c] = point.normal.dot(Vec3(of_point[0], of_point[3], of_point[6]));
-            }
+            const Rgb own = net_irradiance(v, next->index, point.normal);
             links[k] += square(own - there.mean.col(column), there.variance.col(column));
         }
     }, 1);

@@ -100,13 +100,10 @@ Radiosity MovingLight::radiosity(const Radiosity& direct) {
     push_levels(transfer.sender_levels);
     Radiosity sum(direct.size());
     parallel_for(transfer.senders(), [&](Index m) {
-        const Vec3 n = transfer.points.normal.col(m);
-        const float* v = &field_[static_cast<std::size_t>(9 * m)];
-        for (int c = 0; c < 3; ++c) {
-            const auto at = static_cast<std::size_t>(3 * m + c);
-            sum[at] = direct[at] + transfer.points.reflectance(c, m)
-                                       * (n.x() * v[c] + n.y() * v[3 + c] + n.z() * v[6 + c]);
-        }
+        const auto at = 3 * static_cast<std::size_t>(m);
+        Rgb::Map(&sum[at]) = Rgb::Map(&direct[at])
+                             + transfer.points.reflectance.col(m).array()
+                                   * net_irradiance(field_, m, transfer.points.normal.col(m));
     }, 1024);
     return sum;
 }

@@ -13,13 +13,7 @@ struct DisplayPoints {
     const PointHierarchy& points;
     VectorIrradiance& field;
 
-    Rgb irradiance(Index j) const {
-        const Vec3 n = points.normal.col(j);
-        const float* v = &field[static_cast<std::size_t>(9 * j)];
-        Rgb e;
-        for (int c = 0; c < 3; ++c) e[c] = n.x() * v[c] + n.y() * v[3 + c] + n.z() * v[6 + c];
-        return e;
-    }
+    Rgb irradiance(Index j) const { return net_irradiance(field, j, points.normal.col(j)); }
     void add(Index j, const Rgb& change) {
         for (int a = 0; a < 3; ++a)
             for (int c = 0; c < 3; ++c)

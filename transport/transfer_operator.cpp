@@ -88,11 +88,8 @@ Radiosity LightTransport::bounce(const Radiosity& radiosity) const {
     parallel_for(
         transfer_.senders(),
         [&](Index m) {
-            const Vec3 n = points.normal.col(m);
-            const float* v = &field[9 * m];
-            for (int c = 0; c < 3; ++c)
-                next[3 * m + c] = points.reflectance(c, m)
-                                  * (n.x() * v[c] + n.y() * v[3 + c] + n.z() * v[6 + c]);
+            Rgb::Map(&next[3 * static_cast<std::size_t>(m)]) =
+                points.reflectance.col(m).array() * net_irradiance(field, m, points.normal.col(m));
         },
         1024);
     return next;

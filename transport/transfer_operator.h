@@ -57,6 +57,14 @@ using Radiosity = std::vector<float>;
 /// are coefficients, of a field that is the sum over the levels.
 using VectorIrradiance = std::vector<float>;
 
+/// n . V at a point of a field, not clamped [W/m^2].
+inline Rgb net_irradiance(const VectorIrradiance& field, Index point, const Vec3& n) {
+    const float* v = &field[9 * static_cast<std::size_t>(point)];
+    Rgb e;
+    for (int c = 0; c < 3; ++c) e[c] = n.x() * v[c] + n.y() * v[3 + c] + n.z() * v[6 + c];
+    return e;
+}
+
 struct NeumannStatistics {
     int products = 0;      // applications of the bounce operator
     double residual = 0.0; // relative to the first bounce

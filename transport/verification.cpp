@@ -83,6 +83,18 @@ Spotlight random_spotlight(const Surface& surface, FreePlaces& free) {
     return light;
 }
 
+/// Of one and more that are independent of each other.
+ErrorPart root_mean_square(const std::vector<ErrorPart>& parts) {
+    const auto count = static_cast<double>(parts.size());
+    double squares = 0.0, variance = 0.0; // the latter of the former
+    for (const ErrorPart& part : parts) {
+        squares += part.rms * part.rms;
+        variance += std::pow(2.0 * part.rms * part.standard_error, 2);
+    }
+    const double rms = std::sqrt(squares / count);
+    return {rms, rms > 0.0 ? std::sqrt(variance) / count / (2.0 * rms) : 0.0};
+}
+
 } // namespace
 
 Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, int lights, int places,
@@ -175,9 +187,8 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
     const LightTransport transport(transfer, surface_);
     const Display display(transfer, surface_);
     VerifiedError all;
-    double squares = 0.0, variance = 0.0; // the latter of the former
+    std::vector<ErrorPart> of_lights; // those that show
     double certain_squares = 0.0, certain_fourths = 0.0;
-    int lit = 0;
     for (std::size_t t = 0; t < trials_.size(); ++t) {
         const Trial& trial = trials_[t];
         const auto lights = static_cast<Index>(trial.lights.size());
@@ -192,16 +203,14 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
             const Eigen::Array3Xf found = display.irradiance(trial.places, transport.indirect(light), light);
             const VerifiedError error =
                 compare_with_reference(found, indirect, references_[t].standard_error(Eigen::all, of_light));
-            ++lit;
+            of_lights.push_back({error.rel_rmse, error.standard_error});
             shows = true;
-            squares += error.rel_rmse * error.rel_rmse;
             const double of_places = std::sqrt(
                 std::max(0.0, std::pow(error.standard_error, 2) - std::pow(error.noise_error, 2)));
             const double certain = std::clamp((error.rel_rmse - of_places) / 0.8, 0.0, error.rel_rmse);
             certain_squares += certain * certain;
             certain_fourths += std::pow(certain, 4);
-            variance += std::pow(2.0 * error.rel_rmse * error.standard_error, 2);
-            if (lit == 1 || error.rel_rmse > all.worst) {
+            if (of_lights.size() == 1 || error.rel_rmse > all.worst) {
                 all.worst = error.rel_rmse;
                 all.worst_light = all.lights - static_cast<int>(lights) + static_cast<int>(l);
                 all.bias = error.bias;
@@ -210,12 +219,14 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
         }
         if (shows) all.places += static_cast<int>(places);
     }
-    if (lit == 0) return {};
-    all.rel_rmse = std::sqrt(squares / lit);
+    if (of_lights.empty()) return {};
+    const auto lit = static_cast<double>(of_lights.size());
+    const ErrorPart mean = root_mean_square(of_lights);
+    all.rel_rmse = mean.rms;
+    all.standard_error = mean.standard_error;
     all.certain = std::sqrt(certain_squares / lit);
-    if (lit > 1)
+    if (lit > 1.0)
         all.spread = std::sqrt(std::max(0.0, certain_fourths / lit - std::pow(all.certain, 4)) * lit / (lit - 1.0));
-    if (all.rel_rmse > 0.0) all.standard_error = std::sqrt(variance) / lit / (2.0 * all.rel_rmse);
     return all;
 }
 
@@ -224,13 +235,9 @@ ErrorParts Verifier::parts_of(const TransferOperator& transfer, const ErrorParts
     for (std::size_t t = 0; t < trials_.size(); ++t)
         parts.push_back(error_parts(surface_, transfer, trials_[t], references_[t], options));
     const auto mean = [&](ErrorPart ErrorParts::*part) {
-        double square = 0.0, variance = 0.0; // the latter of the former
-        for (const ErrorParts& p : parts) {
-            square += std::pow((p.*part).rms, 2) / static_cast<double>(parts.size());
-            variance += std::pow(2.0 * (p.*part).rms * (p.*part).standard_error / static_cast<double>(parts.size()), 2);
-        }
-        const double rms = std::sqrt(square);
-        return ErrorPart{rms, rms > 0.0 ? std::sqrt(variance) / (2.0 * rms) : 0.0};
+        std::vector<ErrorPart> of_trials;
+        for (const ErrorParts& p : parts) of_trials.push_back(p.*part);
+        return root_mean_square(of_trials);
     };
     return {mean(&ErrorParts::senders), mean(&ErrorParts::links), mean(&ErrorParts::receivers)};
 }

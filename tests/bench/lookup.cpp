@@ -1,7 +1,6 @@
 #include "tests/bench/lookup.h"
 
 #include "basis/r_tree.h"
-#include "core/sampling.h"
 #include "core/seconds.h"
 #include "transport/gather.h"
 #include "transport/precompute.h"
@@ -15,6 +14,7 @@
 #include <cstdio>
 #include <limits>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace afterglow {
