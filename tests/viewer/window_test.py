@@ -23,12 +23,13 @@ def wait_for(condition, what, seconds=60):
 
 
 class Screen:
-    """A display of its own; its number is one that Xvfb finds free."""
+    """A display of its own; its number is one that Xvfb finds free. Without -noreset the server starts
+    over when xdotool, its only client so far, leaves, and turns away who comes meanwhile."""
 
     def __enter__(self):
         read_end, write_end = os.pipe()
         self.server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1024x768x24"],
+            ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1024x768x24", "-noreset"],
             pass_fds=[write_end], stderr=subprocess.DEVNULL)
         os.close(write_end)
         with os.fdopen(read_end) as answer:
