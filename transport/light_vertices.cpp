@@ -6,11 +6,12 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <numbers>
 
 namespace afterglow {
 
 ConeSampler::ConeSampler(const Spotlight& light) : axis_(light.direction), falloff_(light) {
-    const auto cosine = [](float angle) { return std::cos(angle * EIGEN_PI / 180.0); };
+    const auto cosine = [](float angle) { return std::cos(angle * std::numbers::pi / 180.0); };
     // Rounded as in Falloff, which matters for narrow cones.
     cos_outer_ = static_cast<float>(cosine(light.outer_angle));
     const bool hard = light.inner_angle == light.outer_angle;
@@ -20,7 +21,7 @@ ConeSampler::ConeSampler(const Spotlight& light) : axis_(light.direction), fallo
     ramp_integral_ =
         hard ? 0.0 : std::pow(ramp_end_ - cos_outer_, 3.0) / (3.0 * ramp_width_ * ramp_width_);
     flat_integral_ = 1.0 - ramp_end_;
-    inverse_total_ = static_cast<float>(0.5 / EIGEN_PI / (ramp_integral_ + flat_integral_));
+    inverse_total_ = static_cast<float>(0.5 / std::numbers::pi / (ramp_integral_ + flat_integral_));
 }
 
 Vec3 ConeSampler::direction(const Vec2& u) const {
@@ -29,7 +30,7 @@ Vec3 ConeSampler::direction(const Vec2& u) const {
                          ? cos_outer_ + std::cbrt(3.0 * ramp_width_ * ramp_width_ * below)
                          : ramp_end_ + (below - ramp_integral_);
     const double s = std::sqrt(std::max(0.0, (1.0 - c) * (1.0 + c)));
-    const double phi = 2.0 * EIGEN_PI * u.y();
+    const double phi = 2.0 * std::numbers::pi * u.y();
     const Eigen::Vector3d local(s * std::cos(phi), s * std::sin(phi), c);
     return Frame(axis_).to_world(local.cast<float>());
 }
@@ -49,6 +50,7 @@ void trace_light_vertices(const Surface& surface, const Spotlight& light,
                           std::span<const std::uint32_t> indices, std::span<LightVertex> vertices) {
     constexpr std::size_t block = 64;
     assert(vertices.size() == indices.size());
+    const Falloff falloff(light);
     std::array<Ray, block> rays;
     std::array<Hit, block> hits;
     for (std::size_t begin = 0; begin < vertices.size(); begin += block) {
@@ -66,7 +68,7 @@ void trace_light_vertices(const Surface& surface, const Spotlight& light,
             vertex.pdf =
                 light_vertex_pdf(sampler, light, vertex.x.position, vertex.geometric_normal);
             vertex.radiosity =
-                surface.reflectance(hits[k]) * unoccluded_irradiance(light, vertex.x);
+                surface.reflectance(hits[k]) * unoccluded_irradiance(light, falloff, vertex.x);
         }
     }
 }

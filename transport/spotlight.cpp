@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace afterglow {
 namespace {
 
 float cos_degrees(float angle) {
-    return static_cast<float>(std::cos(static_cast<double>(angle) * EIGEN_PI / 180.0));
+    return static_cast<float>(std::cos(static_cast<double>(angle) * std::numbers::pi / 180.0));
 }
 
 } // namespace

@@ -137,15 +137,16 @@ VectorIrradiance LightTransport::apply_paper(const std::vector<float>& direct_ir
     return field;
 }
 
-Radiosity LightTransport::radiosity(const Spotlight& light, NeumannStatistics* statistics) const {
+Radiosity LightTransport::radiosity(const Spotlight& light, NeumannStatistics* statistics,
+                                    double tolerance) const {
     const Radiosity direct = direct_radiosity(light);
-    if (transfer_.bounces == 0) return all_bounces(direct, 2e-3, statistics);
+    if (transfer_.bounces == 0) return all_bounces(direct, tolerance, statistics);
     if (statistics) *statistics = {.products = transfer_.bounces - 1};
     return some_bounces(direct, transfer_.bounces);
 }
 
-VectorIrradiance LightTransport::indirect(const Spotlight& light,
-                                          NeumannStatistics* statistics) const {
+VectorIrradiance LightTransport::indirect(const Spotlight& light, NeumannStatistics* statistics,
+                                          double tolerance) const {
     if (transfer_.kind == OperatorKind::paper) {
         if (statistics) *statistics = {};
         const PointHierarchy& points = transfer_.points;
@@ -156,7 +157,7 @@ VectorIrradiance LightTransport::indirect(const Spotlight& light,
             256);
         return apply_paper(e);
     }
-    VectorIrradiance field = gather(radiosity(light, statistics));
+    VectorIrradiance field = gather(radiosity(light, statistics, tolerance));
     make_positive(transfer_.points, transfer_.push, field);
     return field;
 }

@@ -74,6 +74,8 @@ struct NeumannStatistics {
 /// indirect() alone is there.
 class LightTransport {
 public:
+    static constexpr double usual_tolerance = 2e-3;
+
     /// Keeps references to both, which must outlive it.
     LightTransport(const TransferOperator& transfer, const Surface& surface);
 
@@ -94,7 +96,7 @@ public:
     /// The sum of all bounces, (I - M)^-1 f = f + M f + M^2 f + ...: the Neumann series accelerated
     /// by minimal residuals over its Krylov space (GMRES, Saad and Schultz 1986), each colour by
     /// itself; ends when the residual is below `tolerance` times the first bounce.
-    Radiosity all_bounces(const Radiosity& direct, double tolerance = 2e-3,
+    Radiosity all_bounces(const Radiosity& direct, double tolerance = usual_tolerance,
                           NeumannStatistics* statistics = nullptr) const;
 
     /// The first `count` terms of that sum, one product each but the first.
@@ -104,12 +106,14 @@ public:
     VectorIrradiance gather(const Radiosity& radiosity) const;
 
     /// What the senders radiate under a light after as many bounces as the operator says, direct light
-    /// included. Not of the paper's operator.
-    Radiosity radiosity(const Spotlight& light, NeumannStatistics* statistics = nullptr) const;
+    /// included. Not of the paper's operator. `tolerance` as of all_bounces().
+    Radiosity radiosity(const Spotlight& light, NeumannStatistics* statistics = nullptr,
+                        double tolerance = usual_tolerance) const;
 
     /// Indirect vector irradiance at all points under a light, after as many bounces as the operator
     /// says. Of `neumann` it is nowhere below zero on the display level (make_positive()).
-    VectorIrradiance indirect(const Spotlight& light, NeumannStatistics* statistics = nullptr) const;
+    VectorIrradiance indirect(const Spotlight& light, NeumannStatistics* statistics = nullptr,
+                              double tolerance = usual_tolerance) const;
 
 private:
     const TransferOperator& transfer_;

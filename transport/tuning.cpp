@@ -15,7 +15,7 @@ namespace {
 constexpr float first_scale = 4.0f, finest_scale = 0.25f;
 constexpr int most_steps = 5;
 // Shares of the target, as errors are known to a tenth: what a step aims at, and what is good enough.
-constexpr double aim = 0.8, safely = 0.9;
+constexpr double aim = 0.65, safely = 0.9;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
 
@@ -70,6 +70,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
                                  .places = 250,
                                  .reference_error = 0.5 * tuning.target_error, // its noise is taken out
                                  .most_rays = verification_rays(report),
+                                 .tolerance = std::max(LightTransport::usual_tolerance, 0.1 * tuning.target_error),
                                  .seed = hash64(options.seed, 0x7a5e)});
         result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
         const TuningStep& last = result.steps.back();

@@ -165,7 +165,7 @@ VerifiedError compare_with_reference(const Eigen::Array3Xf& found, const Eigen::
 
 Verifier::Verifier(const Surface& surface, const std::vector<Vec3>& viewpoints,
                    const VerificationOptions& options)
-    : surface_(surface) {
+    : surface_(surface), tolerance_(options.tolerance) {
     constexpr double rays_of_path = 40.0; // shadow rays and connections to three lights included
     for (int t = 0; t < options.trials; ++t) {
         PathTracerOptions tracer;
@@ -200,7 +200,8 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
             const Eigen::Array3Xf indirect = references_[t].indirect(Eigen::all, of_light);
             if (!(indirect > 0.0f).any()) continue; // a light that shines out of the scene
             const Spotlight& light = trial.lights[static_cast<std::size_t>(l)];
-            const Eigen::Array3Xf found = display.irradiance(trial.places, transport.indirect(light), light);
+            const Eigen::Array3Xf found =
+                display.irradiance(trial.places, transport.indirect(light, nullptr, tolerance_), light);
             const VerifiedError error =
                 compare_with_reference(found, indirect, references_[t].standard_error(Eigen::all, of_light));
             of_lights.push_back({error.rel_rmse, error.standard_error});

@@ -31,6 +31,7 @@ struct VerificationOptions {
     int places = 1000; // a trial
     double reference_error = 0.03;        // relative, that the path tracer shall reach
     std::uint64_t most_rays = 10'000'000; // that it takes, about
+    double tolerance = LightTransport::usual_tolerance; // of LightTransport::indirect()
     std::uint64_t seed = 1;
 };
 
@@ -72,6 +73,7 @@ public:
 
 private:
     const Surface& surface_;
+    double tolerance_;
     std::vector<Trial> trials_;
     std::vector<IrradianceEstimate> references_; // a trial each
 };
