@@ -14,14 +14,15 @@ namespace {
 
 constexpr float first_scale = 4.0f, finest_scale = 0.25f;
 constexpr int most_steps = 5;
-// Shares of the target, as errors are known to a tenth: what a step aims at, and what is good enough.
-constexpr double aim = 0.65, safely = 0.9;
+// Shares of the target, as errors are known to a tenth: what a step aims at, the second lower as it is far from the
+// first, what is good enough, and what fresh lights may say.
+constexpr double far_aim = 0.65, aim = 0.8, safely = 0.9, allowed = 1.2;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
 
 /// Of spacings: where a single place decides, less may do than it seems; and a step that costs less than half as
 /// much again as the last is not worth it.
-constexpr double largest_step = 0.3, smallest_step = 0.75;
+constexpr double largest_step = 0.2, smallest_step = 0.75;
 
 /// The order of the error as the last two steps show it.
 double order_of(const std::vector<TuningStep>& steps) {
@@ -35,7 +36,7 @@ double order_of(const std::vector<TuningStep>& steps) {
 } // namespace
 
 double cautious_error(const VerifiedError& error) {
-    constexpr double next_lights = 3.0, allowed = 1.2;
+    constexpr double next_lights = 3.0;
     const double pessimistic = std::sqrt(error.certain * error.certain + error.spread / std::sqrt(next_lights));
     return std::max(error.certain, pessimistic / allowed);
 }
@@ -55,6 +56,10 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
     options.coarse_scale = first_scale;
     std::optional<TransferOperator> transfer;
     result = {};
+    int times_judged = 0;
+    const auto judge = [&](TuningStep& step) {
+        if (tuning.judge) step.judged = tuning.judge(*transfer, report, times_judged++);
+    };
     for (;;) {
         const double begin = elapsed();
         const int step = static_cast<int>(result.steps.size());
@@ -72,21 +77,28 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
                                  .most_rays = verification_rays(report),
                                  .tolerance = std::max(LightTransport::usual_tolerance, 0.1 * tuning.target_error),
                                  .seed = hash64(options.seed, 0x7a5e)});
-        result.steps.push_back({options.coarse_scale, verifier.error_of(*transfer), elapsed() - begin});
-        const TuningStep& last = result.steps.back();
+        TuningStep& last = result.steps.emplace_back();
+        last.coarse_scale = options.coarse_scale;
+        last.error = verifier.error_of(*transfer);
+        last.seconds = elapsed() - begin;
         if (tuning.end_step) tuning.end_step(last);
         if (!last.error.any()) { // then the usual spacing
             result.end = TuningEnd::nothing_to_compare;
-            if (last.coarse_scale <= 1.0f) return std::move(*transfer);
+            if (last.coarse_scale <= 1.0f) break;
             options.coarse_scale = 1.0f;
             continue;
         }
-        const double error = cautious_error(last.error);
-        if (error <= safely * tuning.target_error) break;
+        double error = cautious_error(last.error);
+        if (error <= safely * tuning.target_error) {
+            judge(last);
+            if (last.judged.rel_rmse <= allowed * tuning.target_error) break;
+            error = last.judged.rel_rmse;
+        }
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
 
-        const double wanted = std::pow(aim * tuning.target_error / error, 1.0 / order_of(result.steps));
+        const double wanted =
+            std::pow((step == 0 ? far_aim : aim) * tuning.target_error / error, 1.0 / order_of(result.steps));
         double scale = last.coarse_scale * std::clamp(wanted, largest_step, smallest_step);
         scale = std::max(scale, static_cast<double>(finest_scale));
         // As fine as the limits let it be, if that is worth a step.
@@ -106,7 +118,11 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         }
         options.coarse_scale = static_cast<float>(scale);
     }
-    if (cautious_error(result.steps.back().error) <= tuning.target_error) result.end = TuningEnd::reached;
+    TuningStep& last = result.steps.back();
+    if (!last.judged.any()) judge(last);
+    if (last.error.any() && cautious_error(last.error) <= tuning.target_error
+        && last.judged.rel_rmse <= allowed * tuning.target_error)
+        result.end = TuningEnd::reached;
     return std::move(*transfer);
 }
 

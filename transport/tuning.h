@@ -22,7 +22,8 @@ double cautious_error(const VerifiedError& error);
 struct TuningStep {
     float coarse_scale = 1.0f; // of PrecomputeOptions
     VerifiedError error;       // under lights and at places that all steps share
-    double seconds = 0.0;
+    VerifiedError judged;      // under others, see TuningOptions; mostly of the last step alone
+    double seconds = 0.0;      // without the judgement
 };
 
 struct TuningOptions {
@@ -31,6 +32,10 @@ struct TuningOptions {
     /// [byte]: a step that is expected to exceed one is not begun, but the first always is.
     double most_seconds = std::numeric_limits<double>::infinity();
     double most_bytes = std::numeric_limits<double>::infinity();
+    /// What the result is judged by: the error under lights and at places that no step was chosen by, others
+    /// each time that it is asked. A step that meets the target is judged, and where it misses it by more than
+    /// a fifth the search goes on; the result is always judged.
+    std::function<VerifiedError(const TransferOperator& transfer, const PrecomputeReport& report, int time)> judge = {};
     std::function<void()> begin_step = {};                  // is called before each step
     std::function<void(const TuningStep& step)> end_step = {}; // and after it
 };
@@ -47,7 +52,7 @@ struct TuningReport {
 /// Chooses the spacing of the functions by itself: a coarse precomputation is compared with the path
 /// tracer under two dozen random lights; error goes about like a power of the spacing, near one, so that
 /// the next step's spacing follows; and so on until the target is met. Mostly two steps, of which the
-/// first takes a small part of the time. Other lights and places should tell how well it went, as the
+/// first takes a small part of the time. Other lights and places judge how well it went, as the
 /// steps were chosen by these. Above 10 %, what is dropped of links follows the target too
 /// (link_threshold()).
 ///
