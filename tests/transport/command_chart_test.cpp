@@ -60,14 +60,15 @@ TEST(CommandChart, MeasuresDrawsAndGoesOnWhereItWas) {
 TEST(CommandChart, MeasuresSomeSweepsAlone) {
     const TemporaryFolder folder;
     const std::string start = "chart builtin:cornell --brief -o '" + folder.path("c") + "' --sweeps ";
-    const Outcome made = run(start + "path=4,target=0.3");
+    const Outcome made = run(start + "path=4,path=64,target=0.3");
     ASSERT_EQ(made.status, 0) << made.err;
     const nlohmann::json points = nlohmann::json::parse(content_of(folder.path("c/runs.json")))["runs"];
-    ASSERT_EQ(points.size(), 2u);
+    ASSERT_EQ(points.size(), 3u);
     EXPECT_EQ(points[0]["sweep"], "target");
     EXPECT_EQ(points[0]["value"], 0.3);
     EXPECT_EQ(points[1]["sweep"], "path");
     EXPECT_EQ(points[1]["value"], 4.0);
+    EXPECT_EQ(points[2]["value"], 64.0); // not one of the few that are measured otherwise
     EXPECT_FALSE(std::filesystem::exists(folder.path("c/map_builtin_cornell.json")));
 
     EXPECT_EQ(run(start + "dance").status, 2);

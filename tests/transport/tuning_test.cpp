@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 namespace afterglow {
 namespace {
@@ -71,6 +72,38 @@ TEST(Tuning, GivesTheBestItHasWithinItsLimits) {
     EXPECT_GT(limited.tuning.steps.size(), 1u);
     EXPECT_EQ(limited.tuning.end, TuningEnd::most_seconds);
     EXPECT_LT(limited.last().coarse_scale, hurried.last().coarse_scale);
+}
+
+VerifiedError judgement(double rel_rmse) {
+    VerifiedError error;
+    error.rel_rmse = rel_rmse;
+    error.places = 1;
+    return error;
+}
+
+TEST(Tuning, GoesOnWhereItsJudgeFindsMoreError) {
+    std::vector<int> times;
+    const Tuned severe({.target_error = 0.4, .judge = [&](const TransferOperator&, const PrecomputeReport&, int time) {
+                            times.push_back(time);
+                            return judgement(time == 0 ? 0.9 : 0.1);
+                        }});
+    EXPECT_EQ(times, (std::vector<int>{0, 1}));
+    EXPECT_EQ(severe.tuning.end, TuningEnd::reached);
+    ASSERT_EQ(severe.tuning.steps.size(), 2u);
+    EXPECT_LT(severe.last().coarse_scale, severe.tuning.steps.front().coarse_scale);
+    EXPECT_EQ(severe.tuning.steps.front().judged.rel_rmse, 0.9);
+    EXPECT_EQ(severe.last().judged.rel_rmse, 0.1);
+
+    // A fifth above the target is as good as such a judgement can tell.
+    const Tuned lenient({.target_error = 0.4, .judge = [](const auto&...) { return judgement(0.47); }});
+    EXPECT_EQ(lenient.tuning.steps.size(), 1u);
+    EXPECT_EQ(lenient.tuning.end, TuningEnd::reached);
+
+    // Where there is no time to go on, the judgement stands, and the target is not called reached.
+    const Tuned hurried({.target_error = 0.4, .most_seconds = 1e-3, .judge = [](const auto&...) { return judgement(0.9); }});
+    EXPECT_EQ(hurried.tuning.steps.size(), 1u);
+    EXPECT_EQ(hurried.tuning.end, TuningEnd::most_seconds);
+    EXPECT_EQ(hurried.last().judged.rel_rmse, 0.9);
 }
 
 TEST(Tuning, TakesTheUsualSpacingWhereThereIsNothingToCompare) {
