@@ -131,11 +131,14 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     if (setting.radius_share > 0.0f) options.coarse_radius = setting.radius_share * usual_radius_;
     PrecomputeReport report;
     TuningReport tuning;
+    TuningOptions search;
+    search.target_error = setting.target.value_or(0.0);
+    search.judge = [&](const TransferOperator& found, const PrecomputeReport& of, int time) {
+        return fresh_verifier(surface_, of, options.seed, time).error_of(found);
+    };
     const auto start = Clock::now();
-    const TransferOperator transfer =
-        setting.target
-            ? precompute_to_target(surface_, options, {.target_error = *setting.target}, report, tuning)
-            : precompute(surface_, options, &report);
+    const TransferOperator transfer = setting.target ? precompute_to_target(surface_, options, search, report, tuning)
+                                                     : precompute(surface_, options, &report);
     point.seconds = seconds_since(start);
     point.points_seconds = report.points_seconds;
     point.push_seconds = report.push_seconds;

@@ -158,14 +158,6 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
     return json;
 }
 
-/// With other places and lights for each seed, and each time, than anything else has.
-Verifier fresh_verifier(const Surface& surface, const PrecomputeReport& report, std::uint64_t seed, int time) {
-    VerificationOptions options;
-    options.seed = hash64(seed, 0x7e41f + static_cast<std::uint64_t>(time));
-    options.most_rays = verification_rays(report);
-    return {surface, report.viewpoints, options};
-}
-
 Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
     return {{"load", outer.load},
             {"tree", outer.tree},
@@ -309,7 +301,7 @@ void run(PrecomputeCommand& command) {
         if (command.tuned) {
             verified.error = tuning.steps.back().judged;
         } else {
-            verifier.emplace(fresh_verifier(surface, report, command.options.seed, 0));
+            verifier.emplace(fresh_verifier(surface, report, command.options.seed));
             verified.error = verifier->error_of(transfer);
         }
         if (verified.error.any() && transfer.kind == OperatorKind::neumann)

@@ -24,25 +24,27 @@ constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most
 /// much again as the last is not worth it.
 constexpr double largest_step = 0.2, smallest_step = 0.75;
 
+/// Rays that a comparison with the path tracer may take.
+std::uint64_t verification_rays(const PrecomputeReport& report) {
+    return std::max<std::uint64_t>(4'000'000, (report.links.rays + report.points_rays) / 5);
+}
+
 /// The order of the error as the last two steps show it.
 double order_of(const std::vector<TuningStep>& steps) {
     if (steps.size() < 2) return expected_order;
     const TuningStep &a = steps[steps.size() - 2], &b = steps.back();
-    const double order = std::log(cautious_error(a.error) / cautious_error(b.error))
+    const double order = std::log(a.error.certain / b.error.certain)
                          / std::log(static_cast<double>(a.coarse_scale / b.coarse_scale));
     return std::clamp(order, 0.5, 1.2);
 }
 
 } // namespace
 
-double cautious_error(const VerifiedError& error) {
-    constexpr double next_lights = 3.0;
-    const double pessimistic = std::sqrt(error.certain * error.certain + error.spread / std::sqrt(next_lights));
-    return std::max(error.certain, pessimistic / allowed);
-}
-
-std::uint64_t verification_rays(const PrecomputeReport& report) {
-    return std::max<std::uint64_t>(4'000'000, (report.links.rays + report.points_rays) / 5);
+Verifier fresh_verifier(const Surface& surface, const PrecomputeReport& report, std::uint64_t seed, int time) {
+    VerificationOptions options;
+    options.seed = hash64(seed, 0x7e41f + static_cast<std::uint64_t>(time));
+    options.most_rays = verification_rays(report);
+    return {surface, report.viewpoints, options};
 }
 
 TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions options,
@@ -88,11 +90,11 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
             options.coarse_scale = 1.0f;
             continue;
         }
-        double error = cautious_error(last.error);
+        double error = last.error.certain;
         if (error <= safely * tuning.target_error) {
             judge(last);
             if (last.judged.rel_rmse <= allowed * tuning.target_error) break;
-            error = last.judged.rel_rmse;
+            error = last.judged.certain;
         }
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
@@ -120,7 +122,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
     }
     TuningStep& last = result.steps.back();
     if (!last.judged.any()) judge(last);
-    if (last.error.any() && cautious_error(last.error) <= tuning.target_error
+    if (last.error.any() && last.error.certain <= tuning.target_error
         && last.judged.rel_rmse <= allowed * tuning.target_error)
         result.end = TuningEnd::reached;
     return std::move(*transfer);

@@ -10,14 +10,10 @@
 
 namespace afterglow {
 
-/// Rays that a comparison with the path tracer may take, about a tenth of the time of an operator; in
-/// small scenes what it takes to say anything.
-std::uint64_t verification_rays(const PrecomputeReport& report);
-
-/// Lights differ, and the next three may be harder than most: their mean square is off by its standard error
-/// in one case of six. What a step's error counts as: what is certain of it, or that, of which a fifth above
-/// the target will do.
-double cautious_error(const VerifiedError& error);
+/// What an operator is judged by: three lights and a thousand places, others for each seed and each `time` than
+/// anything else has, in about a tenth of the time that the operator took; in small scenes what it takes to say
+/// anything. Keeps a reference to the surface.
+Verifier fresh_verifier(const Surface& surface, const PrecomputeReport& report, std::uint64_t seed, int time = 0);
 
 struct TuningStep {
     float coarse_scale = 1.0f; // of PrecomputeOptions

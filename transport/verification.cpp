@@ -188,7 +188,7 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
     const Display display(transfer, surface_);
     VerifiedError all;
     std::vector<ErrorPart> of_lights; // those that show
-    double certain_squares = 0.0, certain_fourths = 0.0;
+    double certain_squares = 0.0;
     for (std::size_t t = 0; t < trials_.size(); ++t) {
         const Trial& trial = trials_[t];
         const auto lights = static_cast<Index>(trial.lights.size());
@@ -210,7 +210,6 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
                 std::max(0.0, std::pow(error.standard_error, 2) - std::pow(error.noise_error, 2)));
             const double certain = std::clamp((error.rel_rmse - of_places) / 0.8, 0.0, error.rel_rmse);
             certain_squares += certain * certain;
-            certain_fourths += std::pow(certain, 4);
             if (of_lights.size() == 1 || error.rel_rmse > all.worst) {
                 all.worst = error.rel_rmse;
                 all.worst_light = all.lights - static_cast<int>(lights) + static_cast<int>(l);
@@ -226,8 +225,6 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
     all.rel_rmse = mean.rms;
     all.standard_error = mean.standard_error;
     all.certain = std::sqrt(certain_squares / lit);
-    if (lit > 1.0)
-        all.spread = std::sqrt(std::max(0.0, certain_fourths / lit - std::pow(all.certain, 4)) * lit / (lit - 1.0));
     return all;
 }
 

@@ -46,7 +46,6 @@ struct VerifiedError {
     double certain = 0.0;        // as rel_rmse, of each light's relRMSE less what single places make of it:
                                  // all of it where its standard error, less its
                                  // noise_error, is as large; nothing where that is below a fifth
-    double spread = 0.0;         // standard deviation over the lights of the squares of these
     double bias = 0.0;           // mean error over mean, under that light
     double reference_error = 0.0; // there
     int lights = 0, places = 0; // of all trials
