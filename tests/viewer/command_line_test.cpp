@@ -60,6 +60,15 @@ TEST(CommandLine, DrawsTheSameBytesAtAnyNumberOfThreads) {
     EXPECT_EQ(content_of(files.folder.path("1") + "/frame_0001.exr"), content_of(files.folder.path("2") + "/frame_0001.exr"));
 }
 
+TEST(CommandLine, DrawsThePathOverAndOver) {
+    const Files files;
+    EXPECT_EQ(run("'" + files.file + "'" + files.frame_options("once") + "--indirect splat").status, 0);
+    EXPECT_EQ(run("'" + files.file + "'" + files.frame_options("again") + "--indirect splat --seconds 1").status, 0);
+    EXPECT_NE(content_of(files.folder.path("once") + "/timings.json").find("\"rounds\": 1,"), std::string::npos);
+    EXPECT_EQ(content_of(files.folder.path("again") + "/timings.json").find("\"rounds\": 1,"), std::string::npos);
+    EXPECT_FALSE(content_of(files.folder.path("again") + "/frame_0001.png").empty());
+}
+
 TEST(CommandLine, SaysInOneLineWhatIsWrong) {
     const Files files;
     const std::string open = "'" + files.file + "'", draw = files.frame_options("out");
@@ -76,6 +85,7 @@ TEST(CommandLine, SaysInOneLineWhatIsWrong) {
     expect_one_line(run(open + draw + "--layer depth"), 2, "reflectance");
     expect_one_line(run(open + draw + "--size 0x5"), 2, "--size");
     expect_one_line(run(open + draw + "--exposure 0"), 2, "--exposure");
+    expect_one_line(run(open + draw + "--seconds -1"), 2, "--seconds");
     expect_one_line(run(open + " --context egl"), 2, "no window");
     expect_one_line(run(open, "unset DISPLAY WAYLAND_DISPLAY; "), 1, "no window");
     // No OpenGL at all but in memory: that is enough, unless something else is asked for.
