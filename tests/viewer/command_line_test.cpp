@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <string>
 
 // Runs afterglow-view itself.
@@ -60,13 +61,15 @@ TEST(CommandLine, DrawsTheSameBytesAtAnyNumberOfThreads) {
     EXPECT_EQ(content_of(files.folder.path("1") + "/frame_0001.exr"), content_of(files.folder.path("2") + "/frame_0001.exr"));
 }
 
-TEST(CommandLine, DrawsThePathOverAndOver) {
+TEST(CommandLine, DrawsThePathUntilTheTimeHasPassed) {
     const Files files;
-    EXPECT_EQ(run("'" + files.file + "'" + files.frame_options("once") + "--indirect splat").status, 0);
-    EXPECT_EQ(run("'" + files.file + "'" + files.frame_options("again") + "--indirect splat --seconds 1").status, 0);
-    EXPECT_NE(content_of(files.folder.path("once") + "/timings.json").find("\"rounds\": 1,"), std::string::npos);
-    EXPECT_EQ(content_of(files.folder.path("again") + "/timings.json").find("\"rounds\": 1,"), std::string::npos);
+    const auto seconds = [start = std::chrono::steady_clock::now()] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    };
+    EXPECT_EQ(run("'" + files.file + "'" + files.frame_options("again") + "--seconds 1").status, 0);
+    EXPECT_GE(seconds(), 1.0);
     EXPECT_FALSE(content_of(files.folder.path("again") + "/frame_0001.png").empty());
+    EXPECT_FALSE(content_of(files.folder.path("again") + "/timings.json").empty());
 }
 
 TEST(CommandLine, SaysInOneLineWhatIsWrong) {
