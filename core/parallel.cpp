@@ -8,7 +8,46 @@
 
 #include <algorithm>
 
+#ifdef AFTERGLOW_THREAD_SANITIZER
+#include <sanitizer/tsan_interface.h>
+#endif
+
 namespace afterglow {
+namespace {
+
+/// What a parallel loop orders, for ThreadSanitizer: all before the loop comes before its bodies, and they
+/// before all after it; between two bodies there is no order. This file is compiled without it, as oneTBB
+/// is, whose tasks go from thread to thread by ways that it cannot see.
+class ForkJoin {
+public:
+    ForkJoin() { release(fork_); }
+    ~ForkJoin() { acquire(join_); }
+    ForkJoin(const ForkJoin&) = delete;
+    ForkJoin& operator=(const ForkJoin&) = delete;
+
+    class Body {
+    public:
+        explicit Body(ForkJoin& loop) : loop_(loop) { acquire(loop_.fork_); }
+        ~Body() { release(loop_.join_); }
+        Body(const Body&) = delete;
+        Body& operator=(const Body&) = delete;
+
+    private:
+        ForkJoin& loop_;
+    };
+
+private:
+    char fork_ = 0, join_ = 0; // their addresses count
+#ifdef AFTERGLOW_THREAD_SANITIZER
+    static void acquire(char& order) { __tsan_acquire(&order); }
+    static void release(char& order) { __tsan_release(&order); }
+#else
+    static void acquire(char&) {}
+    static void release(char&) {}
+#endif
+};
+
+} // namespace
 
 ThreadLimit::ThreadLimit(int threads)
     : control_(new tbb::global_control(
@@ -25,9 +64,11 @@ int thread_count() {
 
 void parallel_ranges(Index count, Index grain, const std::function<void(Index, Index)>& body) {
     const Index chunks = (count + grain - 1) / grain;
+    ForkJoin loop;
     tbb::parallel_for(
         tbb::blocked_range<Index>(0, chunks, 1),
         [&](const tbb::blocked_range<Index>& range) {
+            const ForkJoin::Body ordered(loop);
             _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
             _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
             for (Index c = range.begin(); c < range.end(); ++c)

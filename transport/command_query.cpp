@@ -8,9 +8,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <span>
 
 namespace afterglow {
 namespace {
@@ -25,18 +25,23 @@ void run(QueryCommand& command) {
     command.light.check();
     check_output(command.output);
     const ThreadLimit limit(command.run.threads);
-    const std::vector<SurfacePoint> points = read_points_csv(command.points);
     const TransferScene opened(command.file, command.scene);
     if (!command.run.quiet) tell_of_outside_files(opened.scene);
     const VectorIrradiance field = opened.transport.indirect(command.light);
     Index uncovered = 0;
-    const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, command.light, &uncovered);
-    write_irradiance_csv(command.output, irradiance);
+    std::size_t count = 0;
+    answer_points_csv(command.points, command.output, [&](std::span<const SurfacePoint> points) {
+        Index without = 0;
+        const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, command.light, &without);
+        uncovered += without;
+        count += points.size();
+        return irradiance;
+    });
 
     if (command.run.quiet) return;
     if (uncovered > 0)
         std::fprintf(stderr, "afterglow: warning: no function covers %lld of %lld points\n",
-                     static_cast<long long>(uncovered), static_cast<long long>(points.size()));
+                     static_cast<long long>(uncovered), static_cast<long long>(count));
 }
 
 } // namespace
@@ -46,7 +51,8 @@ void add_query_command(CLI::App& app) {
         app.add_subcommand("query", "Indirect irradiance at points, from a transfer file");
     const auto command = std::make_shared<QueryCommand>();
     sub->add_option("file", command->file, "Transfer file")->required()->type_name("FILE");
-    sub->add_option("--points", command->points, "CSV file of x,y,z,nx,ny,nz")->required()->type_name("FILE");
+    sub->add_option("--points", command->points, "CSV file of x,y,z,nx,ny,nz; /dev/stdin to read them as they come")
+        ->required()->type_name("FILE");
     sub->add_option("-o,--output", command->output, "CSV file of E_r,E_g,E_b")->required()->type_name("FILE");
     sub->add_option("--scene", command->scene, "Where the scene is now")->type_name("SCENE");
     add_light_options(*sub, command->light);

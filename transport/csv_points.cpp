@@ -72,29 +72,62 @@ void append_number(std::string& text, float value) {
                 std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
 }
 
-} // namespace
-
-std::vector<SurfacePoint> read_points_csv(const std::string& path) {
-    std::vector<SurfacePoint> points;
+template <class Use>
+void read_points(const std::string& path, const Use& use) {
+    bool any = false;
     read_rows<6>(path, "x,y,z,nx,ny,nz", [&](const std::string& where, const auto& row) {
         const Vec3 normal(row[3], row[4], row[5]);
         const Vec3 unit = normal.stableNormalized();
         if (!(std::abs(unit.norm() - 1.0f) < 1e-3f))
             throw FileError(path, where + "the normal must not be zero");
-        points.push_back({Vec3(row[0], row[1], row[2]), unit});
+        any = true;
+        use(SurfacePoint{Vec3(row[0], row[1], row[2]), unit});
     });
-    if (points.empty()) throw FileError(path, "holds no points");
-    return points;
+    if (!any) throw FileError(path, "holds no points");
 }
 
-void write_irradiance_csv(const std::string& path, const Eigen::Array3Xf& irradiance) {
-    std::string text = "E_r,E_g,E_b\n";
+constexpr const char* irradiance_header = "E_r,E_g,E_b\n";
+
+void append_rows(std::string& text, const Eigen::Array3Xf& irradiance) {
     for (Index k = 0; k < irradiance.cols(); ++k)
         for (int c = 0; c < 3; ++c) {
             append_number(text, irradiance(c, k));
             text += c < 2 ? ',' : '\n';
         }
+}
+
+} // namespace
+
+std::vector<SurfacePoint> read_points_csv(const std::string& path) {
+    std::vector<SurfacePoint> points;
+    read_points(path, [&](const SurfacePoint& point) { points.push_back(point); });
+    return points;
+}
+
+void write_irradiance_csv(const std::string& path, const Eigen::Array3Xf& irradiance) {
+    std::string text = irradiance_header;
+    append_rows(text, irradiance);
     write_file(path, text);
+}
+
+void answer_points_csv(const std::string& points, const std::string& output,
+                       const std::function<Eigen::Array3Xf(std::span<const SurfacePoint>)>& answer,
+                       std::size_t block) {
+    write_atomically(output, [&](OutputFile& file) {
+        std::vector<SurfacePoint> waiting;
+        std::string text = irradiance_header;
+        const auto answer_waiting = [&] {
+            append_rows(text, answer(waiting));
+            file.write(std::as_bytes(std::span(text)));
+            waiting.clear();
+            text.clear();
+        };
+        read_points(points, [&](const SurfacePoint& point) {
+            waiting.push_back(point);
+            if (waiting.size() == block) answer_waiting();
+        });
+        if (!waiting.empty()) answer_waiting();
+    });
 }
 
 Eigen::Array3Xf read_irradiance_csv(const std::string& path) {

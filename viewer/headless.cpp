@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 
@@ -37,23 +38,12 @@ std::string frame_name(std::size_t k, const std::string& format) {
     return name.data() + format;
 }
 
-} // namespace
-
-void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
-    std::vector<Frame> frames = read_frame_path(options.frames);
-    std::error_code failure;
-    std::filesystem::create_directories(options.folder, failure);
-    if (failure) throw FileError(options.folder, "cannot be made: " + failure.message());
-
-    const std::unique_ptr<GlContext> context = make_offscreen_context(options.context);
-    Renderer renderer(context->gl(), scene, options.method);
-    LightSolver solver(scene, 0);
+/// All frames once, and their timings.
+Json draw_round(const std::vector<Frame>& frames, Renderer& renderer, LightSolver& solver,
+                const HeadlessOptions& options) {
     Json timings = Json::array();
     for (std::size_t k = 0; k < frames.size(); ++k) {
-        Frame& frame = frames[k];
-        frame.camera.width = options.width;
-        frame.camera.height = options.height;
-        frame.camera.check();
+        const Frame& frame = frames[k];
         MovingLightStatistics light;
         if (k == 0 || !frame.light.shines_alike(frames[k - 1].light)
             || (frame.light.intensity != frames[k - 1].light.intensity).any()) {
@@ -71,8 +61,34 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
         entry["uncovered_pixels"] = renderer.uncovered_pixels();
         timings.push_back(entry);
     }
-    const std::vector<std::string>& errors = context->gl().errors();
-    if (!errors.empty()) throw Error("OpenGL: " + errors.front());
+    return timings;
+}
+
+} // namespace
+
+void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
+    std::vector<Frame> frames = read_frame_path(options.frames);
+    for (Frame& frame : frames) {
+        frame.camera.width = options.width;
+        frame.camera.height = options.height;
+        frame.camera.check();
+    }
+    std::error_code failure;
+    std::filesystem::create_directories(options.folder, failure);
+    if (failure) throw FileError(options.folder, "cannot be made: " + failure.message());
+
+    const std::unique_ptr<GlContext> context = make_offscreen_context(options.context);
+    Renderer renderer(context->gl(), scene, options.method);
+    LightSolver solver(scene, 0);
+    const auto start = std::chrono::steady_clock::now();
+    int rounds = 0;
+    Json timings;
+    do {
+        timings = draw_round(frames, renderer, solver, options);
+        ++rounds;
+        const std::vector<std::string>& errors = context->gl().errors();
+        if (!errors.empty()) throw Error("OpenGL: " + errors.front());
+    } while (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < options.seconds);
 
     const Json report = {{"version", AFTERGLOW_VERSION},
                          {"opengl", context->gl().renderer()},
@@ -81,6 +97,7 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
                          {"width", options.width},
                          {"height", options.height},
                          {"samples", options.samples},
+                         {"rounds", rounds},
                          {"unit", "ms"},
                          {"frames", timings}};
     write_file((std::filesystem::path(options.folder) / "timings.json").string(), report.dump(1) + "\n");

@@ -17,10 +17,12 @@ struct HeadlessOptions {
     int width = 1280, height = 720;
     int samples = 4;         // a pixel, as of `afterglow render`
     float exposure = 0.18f;  // key of the tone map, for PNG
+    double seconds = 0.0;    // the path is drawn over and over until so many have passed
 };
 
 /// Draws every frame of a path without a window: frame_0000.png and so on, and timings.json with the
-/// milliseconds of each stage of each frame. Throws FileError, UsageError; Error where OpenGL failed.
+/// milliseconds of each stage of each frame, of the last time round where there are several; each replaces
+/// the pictures of the one before. Throws FileError, UsageError; Error where OpenGL failed.
 void draw_frames(const TransferScene& scene, const HeadlessOptions& options);
 
 } // namespace afterglow

@@ -41,6 +41,8 @@ void add_options(CLI::App& app, ViewCommand& command) {
         ->check(CLI::IsMember({"png", "exr"}));
     app.add_option("--samples", command.frames.samples, "Samples a pixel of the frames (default 4)")
         ->check(CLI::Range(1, 4096));
+    add_number(app, "--seconds", command.frames.seconds,
+               "Draw the path over and over, until so long has passed (default 0: once)");
     app.add_option("--context", command.frames.context,
                    "OpenGL's: auto, glfw (a window), egl or osmesa (default auto)")
         ->check(CLI::IsMember({"auto", "glfw", "egl", "osmesa"}));
@@ -76,6 +78,7 @@ void open_window(const ViewCommand& command) {
 void run(ViewCommand& command) {
     if (!(command.exposure > 0.0)) throw UsageError("--exposure must be positive");
     HeadlessOptions& frames = command.frames;
+    if (!(frames.seconds >= 0.0)) throw UsageError("--seconds must not be negative");
     frames.layer = view_layer_from_name(command.layer);
     frames.method = indirect_method_from_name(command.method);
     frames.exposure = static_cast<float>(command.exposure);

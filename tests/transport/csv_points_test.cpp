@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <span>
 #include <string>
 
 namespace afterglow {
@@ -53,6 +55,40 @@ TEST(CsvIrradiance, ComesBackAsTheSameFloats) {
     EXPECT_TRUE((read_irradiance_csv(folder.path("e.csv")) == values).all());
     EXPECT_EQ(folder.count(), 1u);
     EXPECT_THROW(write_irradiance_csv(folder.path("no/such/e.csv"), values), Error);
+}
+
+TEST(CsvAnswers, AreTheSameBytesInBlocksOfAnySize) {
+    const TemporaryFolder folder;
+    std::string text = "x,y,z,nx,ny,nz\n";
+    for (int k = 0; k < 10; ++k) text += std::to_string(k) + ",0.1,0.2,0,1,0\n";
+    const std::string points = folder.write("points.csv", text);
+    const auto answer = [](std::span<const SurfacePoint> block) {
+        Eigen::Array3Xf values(3, static_cast<Index>(block.size()));
+        for (std::size_t k = 0; k < block.size(); ++k)
+            values.col(static_cast<Index>(k)) = block[k].position.array() / 3.0f;
+        return values;
+    };
+    write_irradiance_csv(folder.path("whole.csv"), answer(read_points_csv(points)));
+    for (const std::size_t block : {1, 3, 5, 10, 11}) {
+        std::size_t most = 0;
+        answer_points_csv(points, folder.path("blocks.csv"), [&](std::span<const SurfacePoint> some) {
+            most = std::max(most, some.size());
+            return answer(some);
+        }, block);
+        EXPECT_EQ(content_of(folder.path("blocks.csv")), content_of(folder.path("whole.csv"))) << block;
+        EXPECT_LE(most, block);
+    }
+}
+
+TEST(CsvAnswers, DoNotAppearWhereALaterPointIsWrong) {
+    const TemporaryFolder folder;
+    const auto dark = [](std::span<const SurfacePoint> block) {
+        return Eigen::Array3Xf(Eigen::Array3Xf::Zero(3, static_cast<Index>(block.size())));
+    };
+    const std::string points = folder.write("points.csv", "1,2,3,0,0,1\n1,2,3,0,0,1\n1,2,3,0,0,0\n");
+    EXPECT_THROW(answer_points_csv(points, folder.path("e.csv"), dark, 1), FileError);
+    EXPECT_THROW(answer_points_csv(folder.write("none.csv", ""), folder.path("e.csv"), dark), FileError);
+    EXPECT_EQ(folder.count(), 2u);
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <string>
 
 // Runs afterglow-view itself.
@@ -60,6 +61,17 @@ TEST(CommandLine, DrawsTheSameBytesAtAnyNumberOfThreads) {
     EXPECT_EQ(content_of(files.folder.path("1") + "/frame_0001.exr"), content_of(files.folder.path("2") + "/frame_0001.exr"));
 }
 
+TEST(CommandLine, DrawsThePathUntilTheTimeHasPassed) {
+    const Files files;
+    const auto seconds = [start = std::chrono::steady_clock::now()] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    };
+    EXPECT_EQ(run("'" + files.file + "'" + files.frame_options("again") + "--seconds 1").status, 0);
+    EXPECT_GE(seconds(), 1.0);
+    EXPECT_FALSE(content_of(files.folder.path("again") + "/frame_0001.png").empty());
+    EXPECT_FALSE(content_of(files.folder.path("again") + "/timings.json").empty());
+}
+
 TEST(CommandLine, SaysInOneLineWhatIsWrong) {
     const Files files;
     const std::string open = "'" + files.file + "'", draw = files.frame_options("out");
@@ -76,6 +88,7 @@ TEST(CommandLine, SaysInOneLineWhatIsWrong) {
     expect_one_line(run(open + draw + "--layer depth"), 2, "reflectance");
     expect_one_line(run(open + draw + "--size 0x5"), 2, "--size");
     expect_one_line(run(open + draw + "--exposure 0"), 2, "--exposure");
+    expect_one_line(run(open + draw + "--seconds -1"), 2, "--seconds");
     expect_one_line(run(open + " --context egl"), 2, "no window");
     expect_one_line(run(open, "unset DISPLAY WAYLAND_DISPLAY; "), 1, "no window");
     // No OpenGL at all but in memory: that is enough, unless something else is asked for.
