@@ -21,6 +21,7 @@ LIBRARIES = {  # how the included path starts -> the files, or folders' .cpp fil
     r"stb/|stb_": {"core/image.cpp", "core/texture_file.cpp"},
     r"tiny_obj_loader": {"core/obj_loader.cpp"},
     r"tbb/|oneapi/": {"core/parallel.cpp"},
+    r"sanitizer/": {"core/parallel.cpp"},
     r"nanoflann": {"basis/nearest_points.cpp"},
     r"xxhash": {"core/file.cpp", "transport/safetensors.cpp"},
     r"nlohmann/": {"transport/", "viewer/"},
