@@ -83,7 +83,7 @@ def other_links(scene):
 
 
 def error_against(scene, key, label, factor, sweeps, name, extra=()):
-    figure, axes = plt.subplots(figsize=(6.4, 4.4))
+    figure, axes = plt.subplots(figsize=(8.2, 4.4))
     for sweep in sweeps:
         points = sorted(runs(scene, sweep), key=lambda p: p[key])
         if not points:
@@ -106,7 +106,7 @@ def error_against(scene, key, label, factor, sweeps, name, extra=()):
         axes.text(axes.get_xlim()[0], 100 * max(reference), " the reference's own noise (taken out)",
                   fontsize=6, color="#777777", va="bottom")
     axes.set_title(scene)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
     finish(figure, f"{name}_{file_name(scene)}", scene)
 
 
@@ -189,7 +189,7 @@ def picture(scene):
 
 def break_even():
     """Precomputation over a path traced picture of equal error: its error goes like time to the -1/2."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.4))
+    figure, axes = plt.subplots(figsize=(8.2, 4.4))
     colours = [look[0] for look in LOOKS.values()] + ["#CC79A7", "#F0E442"]
     found = False
     for k, scene in enumerate(scenes):
@@ -215,7 +215,7 @@ def break_even():
     axes.set_xlabel("relRMSE of indirect irradiance [%]")
     axes.set_ylabel("precomputation / path traced picture")
     axes.set_title("Break-even with one picture of 1280 x 720 pixels and equal error")
-    axes.legend(fontsize=7)
+    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
     finish(figure, "break_even", f"{len(scenes)} scene{'s' if len(scenes) > 1 else ''}")
 
 
