@@ -83,6 +83,8 @@ def other_links(scene):
 
 
 def error_against(scene, key, label, factor, sweeps, name, extra=()):
+    if not any(runs(scene, sweep) for sweep in sweeps):
+        return
     figure, axes = plt.subplots(figsize=(8.2, 4.4))
     for sweep in sweeps:
         points = sorted(runs(scene, sweep), key=lambda p: p[key])

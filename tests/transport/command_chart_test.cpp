@@ -71,6 +71,12 @@ TEST(CommandChart, MeasuresSomeSweepsAlone) {
     EXPECT_EQ(points[2]["value"], 64.0); // not one of the few that are measured otherwise
     EXPECT_FALSE(std::filesystem::exists(folder.path("c/map_builtin_cornell.json")));
 
+    // The path tracer alone has no files to draw.
+    const Outcome traced = run("chart builtin:cornell --brief -o '" + folder.path("p") + "' --sweeps path=4");
+    EXPECT_EQ(traced.status, 0) << traced.err;
+    EXPECT_TRUE(std::filesystem::exists(folder.path("p/error_time_builtin_cornell.png")));
+    EXPECT_FALSE(std::filesystem::exists(folder.path("p/error_bytes_builtin_cornell.png")));
+
     EXPECT_EQ(run(start + "dance").status, 2);
     EXPECT_EQ(run(start + "target=0.31").status, 2);
     EXPECT_EQ(run(start + "target=much").status, 2);
