@@ -11,12 +11,10 @@
 namespace afterglow {
 
 ConeSampler::ConeSampler(const Spotlight& light) : axis_(light.direction), falloff_(light) {
-    const auto cosine = [](float angle) { return std::cos(angle * std::numbers::pi / 180.0); };
-    // Rounded as in Falloff, which matters for narrow cones.
-    cos_outer_ = static_cast<float>(cosine(light.outer_angle));
+    cos_outer_ = cos_degrees(light.outer_angle);
     const bool hard = light.inner_angle == light.outer_angle;
     ramp_width_ =
-        hard ? 0.0 : std::max(0.001, static_cast<float>(cosine(light.inner_angle)) - cos_outer_);
+        hard ? 0.0 : std::max(0.001, cos_degrees(light.inner_angle) - cos_outer_);
     ramp_end_ = std::min(1.0, cos_outer_ + ramp_width_);
     ramp_integral_ =
         hard ? 0.0 : std::pow(ramp_end_ - cos_outer_, 3.0) / (3.0 * ramp_width_ * ramp_width_);

@@ -7,13 +7,6 @@
 #include <numbers>
 
 namespace afterglow {
-namespace {
-
-float cos_degrees(float angle) {
-    return static_cast<float>(std::cos(static_cast<double>(angle) * std::numbers::pi / 180.0));
-}
-
-} // namespace
 
 void Spotlight::check() {
     if (!position.allFinite() || !direction.allFinite() || !intensity.allFinite()
@@ -28,6 +21,10 @@ void Spotlight::check() {
     direction = direction.stableNormalized().eval();
     if (!(std::abs(direction.norm() - 1.0f) < 1e-3f))
         throw UsageError("a spotlight's direction must not be zero");
+}
+
+float cos_degrees(float angle) {
+    return static_cast<float>(std::cos(static_cast<double>(angle) * std::numbers::pi / 180.0));
 }
 
 Falloff::Falloff(const Spotlight& light)

@@ -28,6 +28,9 @@ struct Spotlight {
     float falloff(float c) const;
 };
 
+/// Cosine of an angle [degrees]. Whoever asks what a cone contains rounds it alike, which matters for narrow ones.
+float cos_degrees(float angle);
+
 /// Spotlight::falloff of one light, with its cosines at hand: for many c.
 class Falloff {
 public:

@@ -106,10 +106,6 @@ void main() {
 }
 )";
 
-float cosine(float degrees) {
-    return static_cast<float>(std::cos(static_cast<double>(degrees) * EIGEN_PI / 180.0));
-}
-
 } // namespace
 
 ShadowMap::ShadowMap(const Gl& gl)
@@ -148,7 +144,7 @@ void ShadowMap::draw(const SceneMesh& mesh, const Spotlight& light) {
         for (int axis = 0; axis < 3; ++axis)
             for (const float sign : {-1.0f, 1.0f}) {
                 const Vec3 forward = sign * Vec3::Unit(axis);
-                if (forward.dot(light.direction) < cosine(std::min(180.0f, light.outer_angle + 55.0f)))
+                if (forward.dot(light.direction) < cos_degrees(std::min(180.0f, light.outer_angle + 55.0f)))
                     continue;
                 const Vec3 right = Vec3::Unit((axis + 1) % 3);
                 faces_.push_back({forward, right, right.cross(forward)});
@@ -207,11 +203,11 @@ void ShadowMap::shade(const SceneMesh& mesh, const GeometryBuffer& pixels, GLuin
     p.set("light_position", light_.position);
     p.set("light_direction", light_.direction);
     p.set("intensity", light_.intensity);
-    p.set("cos_outer", cosine(light_.outer_angle));
+    p.set("cos_outer", cos_degrees(light_.outer_angle));
     // As Spotlight::falloff.
     p.set("falloff_width", light_.inner_angle == light_.outer_angle
                                ? 0.0f
-                               : std::max(0.001f, cosine(light_.inner_angle) - cosine(light_.outer_angle)));
+                               : std::max(0.001f, cos_degrees(light_.inner_angle) - cos_degrees(light_.outer_angle)));
     gl_.BindVertexArray(vertex_array_);
     gl_.DrawArrays(GL_TRIANGLES, 0, 3);
 }
