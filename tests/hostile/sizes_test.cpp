@@ -30,9 +30,10 @@ std::string little_endian(std::uint32_t number) {
 }
 
 /// A file of 200 bytes that starts like this.
-std::string padded(std::string start) {
-    start.resize(200, 'x');
-    return start;
+std::string padded(const std::string& start) {
+    std::string bytes(200, 'x');
+    start.copy(bytes.data(), bytes.size());
+    return bytes;
 }
 
 /// Pictures of which the header, all that there is, promises `side` times `side` texels.
