@@ -27,8 +27,9 @@ inline void embree_intersect(RTCScene scene, RTCRayHit& query) {
     RTCIntersectContext context = embree_context();
     rtcIntersect1(scene, &context, &query);
 }
-inline void embree_intersect(const int* valid, RTCScene scene, RTCRayHit8& packet) {
+inline void embree_intersect(const int* valid, RTCScene scene, RTCRayHit8& packet, bool coherent) {
     RTCIntersectContext context = embree_context();
+    if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcIntersect8(valid, scene, &context, &packet);
 }
 inline void embree_occluded(RTCScene scene, RTCRay& query) {
@@ -44,8 +45,11 @@ inline void embree_occluded(const int* valid, RTCScene scene, RTCRay8& packet) {
 
 // Embree 4 has a context of its own where none is given, and takes rays for incoherent as Embree 3 does.
 inline void embree_intersect(RTCScene scene, RTCRayHit& query) { rtcIntersect1(scene, &query); }
-inline void embree_intersect(const int* valid, RTCScene scene, RTCRayHit8& packet) {
-    rtcIntersect8(valid, scene, &packet);
+inline void embree_intersect(const int* valid, RTCScene scene, RTCRayHit8& packet, bool coherent) {
+    RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    if (coherent) arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcIntersect8(valid, scene, &packet, &arguments);
 }
 inline void embree_occluded(RTCScene scene, RTCRay& query) { rtcOccluded1(scene, &query); }
 inline void embree_occluded(const int* valid, RTCScene scene, RTCRay8& packet) {

@@ -132,7 +132,7 @@ Hit Surface::closest_hit(const Ray& ray) const {
             length > 0.0f ? std::abs(facing) / length : 1.0f};
 }
 
-void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const {
+void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits, bool coherent) const {
     alignas(32) int valid[packet_width];
     alignas(32) RTCRayHit8 packet;
     for (std::size_t begin = 0; begin < rays.size(); begin += packet_width) {
@@ -142,7 +142,7 @@ void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits) const
             put(packet.ray, k, rays[begin + std::min(k, count - 1)]);
             packet.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
         }
-        embree_intersect(valid, tree_->scene, packet);
+        embree_intersect(valid, tree_->scene, packet, coherent);
         for (std::size_t k = 0; k < count; ++k) {
             Hit& hit = hits[begin + k];
             if (packet.hit.geomID[k] == RTC_INVALID_GEOMETRY_ID) {

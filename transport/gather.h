@@ -40,24 +40,18 @@ struct Footprint {
 
 /// Directions for the rays of many receivers, density (cos + 1/2) / (2 pi): one Sobol sequence under
 /// a digital shift, dealt out in the receivers' order (Morton), so that point k of receiver i is
-/// number i N + k and neighbours stratify each other. Within a receiver ordered so that rays of
-/// similar direction are neighbours.
+/// number i N + k and neighbours stratify each other. Within a receiver they come in Morton order of the
+/// square that they are made from, so that rays of similar direction are neighbours.
 class GatherDirections {
 public:
     /// rays: a power of two.
     GatherDirections(int rays, std::uint64_t seed);
     int rays() const { return static_cast<int>(sobol_.size()); }
     /// directions: rays() columns about +z.
-    void deal(Index receiver, Eigen::Matrix3Xf& directions) const {
-        directions.resize(3, rays());
-        deal(receiver, 0, directions);
-    }
-    /// Those of the points [first, first + directions.cols()) of a receiver's share, about +z; first and
-    /// count multiples of a power of two make a well spread set.
-    void deal(Index receiver, int first, Eigen::Matrix3Xf& directions) const;
+    void deal(Index receiver, Eigen::Matrix3Xf& directions) const;
 
 private:
-    std::vector<std::array<std::uint32_t, 2>> sobol_; // the first `rays` points
+    std::vector<std::array<std::uint32_t, 2>> sobol_; // the first `rays` points, in Morton order
     std::array<std::uint32_t, 2> shift_;
 };
 
@@ -65,16 +59,10 @@ private:
 /// SenderRows::see.
 std::vector<Hit> arrivals(const Surface& surface, const PointHierarchy& points, std::uint64_t seed);
 
-/// Of the rays of each receiver, those from `first` on.
-struct RayRange {
-    int first, count;
-};
-
-/// Traces these gather rays of `receivers`, points of a level that begins with first_receiver:
-/// samples[r * directions.rays() + k] for k in the range. `samples` has room for all.
-void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
-                  std::span<const std::uint32_t> receivers, Index first_receiver,
-                  const GatherDirections& directions, RayRange range, const Footprint& footprint,
+/// Traces the gather rays of as many receivers as `samples` has room for, from `begin` on, points of a level
+/// that begins with level_begin: samples[(i - begin) directions.rays() + k].
+void trace_gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points, Index begin,
+                  Index level_begin, const GatherDirections& directions, const Footprint& footprint,
                   std::span<GatherSample> samples);
 
 } // namespace afterglow

@@ -9,7 +9,6 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
-#include <numeric>
 
 namespace afterglow {
 namespace {
@@ -22,18 +21,15 @@ struct PushedRow {
     std::vector<LinkVector> value;
 };
 
+/// Links of the display level must exceed so many thresholds.
+constexpr float display_threshold = 4.0f;
+
 /// Thresholds of one receiver level, on the size of a link.
 struct LevelThresholds {
     std::vector<float> kept; // a sender level: what a link must exceed to be stored
     bool has_children;
     float negligible; // what a pushed link must exceed to be predicted for the children
 };
-
-/// A display receiver casts a quarter of its rays first, and no more where no link that they show is this
-/// much larger than its threshold: two of five need no links. Those of the coarsest senders are the
-/// noisiest beside it. Counts in docs/performance.md.
-constexpr int first_rays_divisor = 4;
-constexpr float expecting = 1.5f, expecting_coarsest = 6.0f;
 
 /// What a thread needs to turn samples into the row of a receiver.
 class RowMaker {
@@ -50,7 +46,7 @@ public:
     void make(Index i, int level, std::span<const GatherSample> samples,
               std::span<const PushedRow> parents, const LevelThresholds& thresholds,
               std::vector<PackedLink>& kept, PushedRow& pushed, std::uint64_t& links_before) {
-        gather(samples, 1.0f);
+        gather(samples);
         difference_senders(thresholds.kept[0]);
         if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
         threshold(level, thresholds.kept, kept, links_before);
@@ -67,31 +63,14 @@ public:
         clear();
     }
 
-    /// Whether the first samples of a receiver, a `share` of them, let expect that links will be stored.
-    bool expects_links(Index i, int level, std::span<const GatherSample> samples, float share,
-                       std::span<const PushedRow> parents, const LevelThresholds& thresholds) {
-        gather(samples, 1.0f / share);
-        difference_senders(thresholds.kept[0]);
-        if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
-        bool found = false;
-        for (int k = 0; k < sender_levels_ && !found; ++k) {
-            const float limit = (k == 0 ? expecting_coarsest : expecting) * thresholds.kept[k];
-            link_.for_each(points_.begin(k), points_.end(k), [&](std::uint32_t, const LinkVector& d) {
-                found |= d.squaredNorm() > limit * limit;
-            });
-        }
-        clear();
-        return found;
-    }
-
 private:
     void clear() {
         link_.clear();
         predicted_.clear();
     }
 
-    /// Raw links, of samples that all count `factor` times: first to sender values, then, by the transpose of push, to sender coefficients.
-    void gather(std::span<const GatherSample> samples, float factor) {
+    /// Raw links: first to sender values, then, by the transpose of push, to sender coefficients.
+    void gather(std::span<const GatherSample> samples) {
         constexpr std::size_t far = 16, near = 8;
         for (std::size_t k = 0; k < samples.size(); ++k) {
             // The rows lie scattered over memory: ask for them while others are added.
@@ -101,7 +80,7 @@ private:
                 rows_.prefetch_row(samples[k + near].row);
             const GatherSample& s = samples[k];
             if (s.row == no_index) continue;
-            const LinkVector weight = factor * LinkVector(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
+            const LinkVector weight(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
             for (const BasisEntry& entry : rows_.row(s.row))
                 link_.at(entry.index) += entry.value * weight;
         }
@@ -240,7 +219,7 @@ LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, 
     const int display = points.levels() - 1;
     const auto receiver = [&](int l) {
         const float finer = points.spacing.back() / points.spacing[l];
-        return threshold * (l == display ? 4.0f : finer * finer);
+        return threshold * (l == display ? display_threshold : finer * finer);
     };
     LevelThresholds thresholds{{}, level != display, 0.0f};
     for (int k = 0; k < sender_levels; ++k)
@@ -254,8 +233,18 @@ LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, 
     return thresholds;
 }
 
+/// Of a display receiver, see LinkOptions; so many that a link on its threshold is one ray and a half, which
+/// add 2 / N each on average.
+int display_rays(const LinkOptions& options, const PointHierarchy& points) {
+    const double suffice = 1.5 * 2.0 / (display_threshold * link_threshold(options, points));
+    const double of_usual = std::exp2(std::ceil(std::log2(suffice) - 0.01));
+    const double share = std::min(1.0, of_usual / std::min(options.rays, LinkOptions().rays));
+    return static_cast<int>(share * options.rays);
+}
+
 /// Of a receiver of a level; see LinkOptions.
 int gather_rays(const LinkOptions& options, const PointHierarchy& points, int level) {
+    if (level + 1 == points.levels()) return display_rays(options, points);
     const double ratio = std::max(1.0f, points.spacing[level] / points.spacing.back());
     const double least = options.rays * ratio;
     const double wanted = std::clamp(options.rays * std::pow(ratio, 1.5), least,
@@ -272,6 +261,19 @@ std::uint64_t rays_of_all(const LinkOptions& options, const PointHierarchy& poin
             rays += static_cast<std::uint64_t>(points.end(l) - points.begin(l))
                     * static_cast<std::uint64_t>(gather_rays(options, points, l));
     return rays;
+}
+
+/// Makes the rows at the ends of these rays, those of a range of samples at a time, in order.
+void require_rows(std::span<const GatherSample> samples, SenderRows& rows) {
+    constexpr Index grain = 8192;
+    std::vector<std::vector<std::uint32_t>> missing(samples.size() / grain + 1);
+    parallel_ranges(static_cast<Index>(samples.size()), grain, [&](Index first, Index last) {
+        for (const GatherSample& s : samples.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first)))
+            if (s.row != no_index && !rows.is_made(s.row)) missing[static_cast<std::size_t>(first / grain)].push_back(s.row);
+    });
+    std::vector<std::uint32_t> needed;
+    for (const auto& of_range : missing) needed.insert(needed.end(), of_range.begin(), of_range.end());
+    rows.require(needed);
 }
 
 } // namespace
@@ -307,13 +309,12 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     std::vector<std::vector<PackedLink>> done(points.size());
     std::vector<PushedRow> parents, pushed;
     std::vector<GatherSample> samples;
-    std::vector<std::uint32_t> needed;
     ScratchPool<RowMaker> makers(
         [&] { return std::make_unique<RowMaker>(points, push, pull, rows); });
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     statistics.threshold = link_threshold(options, points);
     const auto all_rays = static_cast<double>(rays_of_all(options, points));
-    double rays_begun = 0.0; // those that were not needed included
+    double rays_begun = 0.0; // those of receivers that were done before included
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue; // senders alone
         const GatherDirections directions = gather_directions(options, points, l);
@@ -325,49 +326,20 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
         const int count = directions.rays();
-        const int first_count = thresholds.has_children ? count : count / first_rays_divisor;
         const Index batch = std::max<Index>(grain, samples_at_once / count);
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
-            std::vector<std::uint32_t> receivers(static_cast<std::size_t>(end - begin));
-            std::iota(receivers.begin(), receivers.end(), static_cast<std::uint32_t>(begin));
-            samples.resize(receivers.size() * static_cast<std::size_t>(count));
-            rays_begun += static_cast<double>(samples.size());
-            const auto samples_of = [&](Index r, RayRange range) {
-                return std::span(samples).subspan(static_cast<std::size_t>(r * count + range.first),
-                                                  static_cast<std::size_t>(range.count));
-            };
-            const auto trace = [&](RayRange range) {
-                auto start = Clock::now();
-                trace_gather(surface, rows, points, receivers, points.begin(l), directions, range,
-                             footprint, samples);
-                statistics.trace_seconds += seconds_since(start);
-                statistics.rays += receivers.size() * static_cast<std::size_t>(range.count);
-                start = Clock::now();
-                // Those of a range of receivers at a time, in order.
-                std::vector<std::vector<std::uint32_t>> missing(receivers.size() / grain + 1);
-                parallel_ranges(static_cast<Index>(receivers.size()), grain, [&](Index first, Index last) {
-                    for (Index r = first; r < last; ++r)
-                        for (const GatherSample& s : samples_of(r, range))
-                            if (s.row != no_index && !rows.is_made(s.row))
-                                missing[static_cast<std::size_t>(first / grain)].push_back(s.row);
-                });
-                needed.clear();
-                for (const auto& of_range : missing) needed.insert(needed.end(), of_range.begin(), of_range.end());
-                rows.require(needed);
-                statistics.rows_seconds += seconds_since(start);
-            };
+            rays_begun += static_cast<double>(end - begin) * count;
             const auto for_each_receiver = [&](const auto& body) {
                 const auto start = Clock::now();
-                parallel_ranges(static_cast<Index>(receivers.size()), grain, [&](Index first, Index last) {
+                parallel_ranges(end - begin, grain, [&](Index first, Index last) {
                     const auto maker = makers.borrow();
-                    for (Index r = first; r < last; ++r) body(*maker, r);
+                    for (Index i = begin + first; i < begin + last; ++i) body(*maker, i);
                 });
                 statistics.links_seconds += seconds_since(start);
             };
             if (end <= static_cast<Index>(resumption.done)) {
-                for_each_receiver([&](RowMaker& maker, Index r) {
-                    const Index i = receivers[r];
+                for_each_receiver([&](RowMaker& maker, Index i) {
                     const auto row = resumption.links.row(i);
                     done[i].assign(row.begin(), row.end());
                     if (thresholds.has_children)
@@ -376,28 +348,18 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
                 });
                 continue;
             }
-            trace({0, first_count});
-            if (first_count < count) {
-                std::vector<char> wanted(receivers.size());
-                for_each_receiver([&](RowMaker& maker, Index r) {
-                    wanted[r] = maker.expects_links(receivers[r], l, samples_of(r, {0, first_count}),
-                                                    static_cast<float>(first_count) / static_cast<float>(count),
-                                                    parents, thresholds);
-                });
-                std::size_t kept = 0;
-                for (std::size_t r = 0; r < receivers.size(); ++r) {
-                    if (!wanted[r]) continue;
-                    std::copy_n(samples_of(static_cast<Index>(r), {0, first_count}).begin(), first_count,
-                                samples_of(static_cast<Index>(kept), {0, first_count}).begin());
-                    receivers[kept++] = receivers[r];
-                }
-                receivers.resize(kept);
-                trace({first_count, count - first_count});
-            }
-            std::vector<std::uint64_t> links_before(receivers.size());
-            for_each_receiver([&](RowMaker& maker, Index r) {
-                const Index i = receivers[r];
-                maker.make(i, l, samples_of(r, {0, count}), parents, thresholds, done[i],
+            auto start = Clock::now();
+            samples.resize(static_cast<std::size_t>((end - begin) * count));
+            trace_gather(surface, rows, points, begin, points.begin(l), directions, footprint, samples);
+            statistics.trace_seconds += seconds_since(start);
+            statistics.rays += samples.size();
+            start = Clock::now();
+            require_rows(samples, rows);
+            statistics.rows_seconds += seconds_since(start);
+            std::vector<std::uint64_t> links_before(static_cast<std::size_t>(end - begin));
+            for_each_receiver([&](RowMaker& maker, Index i) {
+                const auto r = static_cast<std::size_t>(i - begin);
+                maker.make(i, l, std::span(samples).subspan(r * count, count), parents, thresholds, done[i],
                            pushed[i - points.begin(l)], links_before[r]);
             });
             for (const std::uint64_t of_receiver : links_before)

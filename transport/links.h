@@ -12,17 +12,18 @@
 namespace afterglow {
 
 struct LinkOptions {
-    /// Of a receiver on the display level; a power of two. A quarter will do where that shows no link
-    /// that would be kept.
+    /// A power of two. A receiver on level l casts R_l / R_L times as many, R_L: the display level's spacing,
+    /// as its links must be less noisy where its threshold is lower; of few rays (R_l / R_L)^1.5 times as
+    /// many until there are 512 R_l / R_L. Rounded down to a power of two, and never more than most_rays.
+    /// On the display level itself 3 / (4 threshold) of 512 suffice, rounded up to a power of two (usually 128):
+    /// of so many, one and a half add a link on its threshold. Of more or fewer rays the same share, but not
+    /// fewer than these.
     int rays = 512;
-    /// Coarser levels l have more, R_l / R_L times as many, as their links must be less noisy where their
-    /// thresholds are lower; of few rays (R_l / R_L)^1.5 times as many until there are 512 R_l / R_L.
-    /// Rounded down to a power of two, and never more than these.
     int most_rays = 8192;
     float footprint_angle = 0.02f; // see Footprint
     /// A link d of a receiver on level l to a sender on level k is kept where
     ///
-    ///     |d| (R_l / R_L)^2 (R_k / R_0)^(1/2) > threshold,   R_L: the display level's spacing.
+    ///     |d| (R_l / R_L)^2 (R_k / R_0)^(1/2) > threshold,
     ///
     /// and on the display level itself where |d| (R_k / R_0)^(1/2) > 4 threshold.
     /// Receivers: what a coarse one loses, all finer ones lose in the same direction, as bias; what

@@ -76,14 +76,12 @@ private:
     RTCScene scene_;
 };
 
-/// Seconds that Embree alone takes for the gather's rays; those of the display level are a share of all.
+/// Seconds that Embree alone takes for the gather's rays.
 double gather_rays_alone(const Surface& surface, const EmbreeAlone& embree, const PointHierarchy& points,
-                         const LinkOptions& options, std::uint64_t rays_traced) {
-    double coarse = 0.0, display = 0.0;
-    std::uint64_t coarse_rays = 0, display_rays = 0;
+                         const LinkOptions& options) {
+    double seconds = 0.0;
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue;
-        const bool is_display = l + 1 == points.levels();
         const GatherDirections directions = gather_directions(options, points, l);
         const auto rays = static_cast<std::size_t>(directions.rays());
         constexpr Index at_once = 256; // points whose rays are made before the clock runs
@@ -105,11 +103,10 @@ double gather_rays_alone(const Surface& surface, const EmbreeAlone& embree, cons
                     static_cast<std::size_t>(first) * rays, static_cast<std::size_t>(last - first) * rays));
                 (void)keep;
             });
-            (is_display ? display : coarse) += seconds_since(start);
-            (is_display ? display_rays : coarse_rays) += static_cast<std::size_t>(count) * rays;
+            seconds += seconds_since(start);
         }
     }
-    return coarse + display * static_cast<double>(rays_traced - coarse_rays) / static_cast<double>(display_rays);
+    return seconds;
 }
 
 /// Seconds to evaluate the openness feature at all points that carry one.
@@ -134,7 +131,7 @@ Run run_once(const Surface& surface, const EmbreeAlone& embree, const Precompute
     const TransferOperator transfer = precompute(surface, options, &r);
     return {r.total_seconds, r.points_seconds,
             r.links.trace_seconds + r.links.rows_seconds + r.links.links_seconds,
-            gather_rays_alone(surface, embree, transfer.points, options.links, r.links.rays),
+            gather_rays_alone(surface, embree, transfer.points, options.links),
             features_alone(surface, transfer.points)};
 }
 

@@ -136,13 +136,15 @@ TEST(Surface, AnswersPacketsLikeSingleRays) {
     for (const int count : {0, 1, 7, 8, 9, 1001}) {
         const std::vector<Ray> rays = random_rays(count, 6);
         std::vector<Hit> hits(rays.size());
-        surface.closest_hits(rays, hits);
-        for (std::size_t i = 0; i < rays.size(); ++i) {
-            const Hit single = surface.closest_hit(rays[i]);
-            ASSERT_EQ(hits[i].primitive, single.primitive);
-            if (!single) continue;
-            EXPECT_NEAR(hits[i].distance, single.distance, 1e-5f);
-            EXPECT_EQ(hits[i].back_side, single.back_side);
+        for (const bool coherent : {false, true}) {
+            surface.closest_hits(rays, hits, coherent);
+            for (std::size_t i = 0; i < rays.size(); ++i) {
+                const Hit single = surface.closest_hit(rays[i]);
+                ASSERT_EQ(hits[i].primitive, single.primitive);
+                if (!single) continue;
+                EXPECT_NEAR(hits[i].distance, single.distance, 1e-5f);
+                EXPECT_EQ(hits[i].back_side, single.back_side);
+            }
         }
     }
 }
@@ -266,6 +268,30 @@ TEST(Surface, LetsNoRaySlipThroughBetweenTwoTriangles) {
             const Vec3 at = (1.0f - along) * scene.positions[t[0]] + along * scene.positions[t[1]];
             escaped += !surface.closest_hit({from, (at - from).normalized()});
             escaped += !surface.occluded({from, (at - from).normalized()});
+        });
+        EXPECT_EQ(escaped, 0);
+    }
+}
+
+TEST(Surface, LetsNoRayOfAPacketSlipThroughBetweenTwoTriangles) {
+    for (const bool coherent : {false, true}) {
+        const Scene scene = closed_shell(60, true);
+        const Surface surface(scene);
+        std::atomic<int> escaped = 0;
+        parallel_for(50'000, [&](Index i) {
+            Rng rng(12, static_cast<std::uint64_t>(i));
+            const Vec3 from = Vec3(5.3f, 1.1f, -7.7f) + 1.9f * random_point(rng);
+            std::array<Ray, 8> rays;
+            std::array<Hit, 8> hits;
+            const std::size_t first = rng.next() % (scene.triangles.size() - rays.size());
+            for (std::size_t k = 0; k < rays.size(); ++k) { // triangles side by side, as in the gather
+                const Triangle& t = scene.triangles[first + k];
+                const float along = i % 4 == 0 ? 0.0f : rng.uniform();
+                const Vec3 at = (1.0f - along) * scene.positions[t[0]] + along * scene.positions[t[1]];
+                rays[k] = {from, (at - from).normalized()};
+            }
+            surface.closest_hits(rays, hits, coherent);
+            for (const Hit& hit : hits) escaped += !hit;
         });
         EXPECT_EQ(escaped, 0);
     }

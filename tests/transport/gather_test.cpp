@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <set>
 #include <utility>
 #include <vector>
@@ -36,10 +35,8 @@ PointHierarchy receivers_at(const std::vector<SurfacePoint>& places) {
 std::vector<GatherSample> gather(const Surface& surface, const SenderRows& rows, const PointHierarchy& points,
                                  std::uint32_t begin, std::uint32_t end, const GatherDirections& directions,
                                  const Footprint& footprint = {}) {
-    std::vector<std::uint32_t> receivers(end - begin);
-    std::iota(receivers.begin(), receivers.end(), begin);
-    std::vector<GatherSample> samples(receivers.size() * static_cast<std::size_t>(directions.rays()));
-    trace_gather(surface, rows, points, receivers, 0, directions, {0, directions.rays()}, footprint, samples);
+    std::vector<GatherSample> samples((end - begin) * static_cast<std::size_t>(directions.rays()));
+    trace_gather(surface, rows, points, begin, 0, directions, footprint, samples);
     return samples;
 }
 
@@ -123,30 +120,6 @@ TEST(GatherDirections, StratifyEachReceiverAndItsNeighbours) {
                 four.clear();
             }
         }
-    }
-}
-
-/// A part of a receiver's rays is a part of the same directions, and well spread itself.
-TEST(GatherDirections, ComeInParts) {
-    const GatherDirections directions(256, 9);
-    for (const Index receiver : {0, 1, 1000}) {
-        Eigen::Matrix3Xf all, first(3, 64), others(3, 192);
-        directions.deal(receiver, all);
-        directions.deal(receiver, 0, first);
-        directions.deal(receiver, 64, others);
-        std::set<std::array<float, 3>> wanted, found;
-        for (Index k = 0; k < 256; ++k) wanted.insert({all(0, k), all(1, k), all(2, k)});
-        for (const Eigen::Matrix3Xf* part : {&first, &others})
-            for (Index k = 0; k < part->cols(); ++k)
-                found.insert({(*part)(0, k), (*part)(1, k), (*part)(2, k)});
-        EXPECT_EQ(found, wanted);
-        // Sixteen sectors of azimuth, four of the 64 each.
-        std::array<int, 16> sector{};
-        for (Index k = 0; k < 64; ++k) {
-            const double turn = std::atan2(first(1, k), first(0, k)) / (2.0 * pi) + 1.0;
-            ++sector[static_cast<std::size_t>(16.0 * (turn - std::floor(turn))) % 16];
-        }
-        for (const int count : sector) EXPECT_EQ(count, 4);
     }
 }
 
