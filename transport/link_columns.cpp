@@ -6,21 +6,6 @@
 #include <cmath>
 
 namespace afterglow {
-namespace {
-
-// An entry: the receiver within its block, 13 bits, then from bit 13 on what bits 7 to 23 of a
-// PackedLink are: exponent, x, y and z.
-static_assert(LinkColumns::block_size == 1 << 13);
-
-std::uint32_t pack(Index receiver, std::uint32_t bits) {
-    return static_cast<std::uint32_t>(receiver) | (bits >> 7) << 13;
-}
-Index receiver_of(std::uint32_t entry) { return entry & 8191u; }
-std::uint32_t bits_of(std::uint32_t entry) { return (entry >> 13) << 7; }
-LinkVector vector_of(std::uint32_t entry) { return Links::vector_of(bits_of(entry)); }
-
-} // namespace
-
 LinkColumns::LinkColumns(const Links& links, Index senders)
     : receivers_(links.rows()), senders_(senders),
       begin_(static_cast<std::size_t>(blocks() * (senders + 1))),
@@ -29,14 +14,14 @@ LinkColumns::LinkColumns(const Links& links, Index senders)
         const Index first = block * block_size;
         for (Index i = first; i < std::min(receivers_, first + block_size); ++i)
             links.for_each_packed(i, [&](std::uint32_t sender, std::uint32_t bits) {
-                visit(sender, pack(i - first, bits));
+                visit(sender, ColumnLink::pack(i - first, bits));
             });
     };
     // How many of each sender, then where they begin, then the entries themselves.
     const auto per_block = static_cast<std::size_t>(senders + 1);
     parallel_for(blocks(), [&](Index block) {
         std::uint64_t* count = &begin_[static_cast<std::size_t>(block) * per_block];
-        for_each_of_block(block, [&](std::uint32_t sender, std::uint32_t) { ++count[sender]; });
+        for_each_of_block(block, [&](std::uint32_t sender, ColumnLink) { ++count[sender]; });
     }, 1);
     std::uint64_t total = 0;
     for (std::size_t k = 0; k < begin_.size(); ++k) {
@@ -49,7 +34,7 @@ LinkColumns::LinkColumns(const Links& links, Index senders)
     parallel_for(blocks(), [&](Index block) {
         const auto first = begin_.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(block) * per_block);
         std::vector<std::uint64_t> next(first, first + static_cast<std::ptrdiff_t>(per_block));
-        for_each_of_block(block, [&](std::uint32_t sender, std::uint32_t entry) {
+        for_each_of_block(block, [&](std::uint32_t sender, ColumnLink entry) {
             entry_[next[sender]++] = entry;
         });
     }, 1);
@@ -59,12 +44,7 @@ void LinkColumns::add_product(std::span<const Change> changes, std::span<Eigen::
     parallel_for(blocks(), [&](Index block) {
         float* const first = to[static_cast<std::size_t>(3 * block * block_size)].data();
         for (const Change& change : changes)
-            for (const std::uint32_t entry : segment(block, change.sender)) {
-                float* const at = first + 12 * receiver_of(entry);
-                LinkSum sum(at);
-                sum.add(bits_of(entry), change.coefficients.data());
-                sum.store(at);
-            }
+            add_column(segment(block, change.sender), change.coefficients.data(), first);
     }, 1);
 }
 
@@ -73,9 +53,9 @@ std::vector<float> LinkColumns::norms(std::span<const float> weights) const {
     parallel_for(senders_, [&](Index sender) {
         double sum = 0.0;
         for (Index block = 0; block < blocks(); ++block)
-            for (const std::uint32_t entry : segment(block, sender))
-                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size + receiver_of(entry))])
-                       * vector_of(entry).squaredNorm();
+            for (const ColumnLink& link : segment(block, sender))
+                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size + link.receiver())])
+                       * link.vector().squaredNorm();
         norms[static_cast<std::size_t>(sender)] = static_cast<float>(std::sqrt(sum));
     });
     return norms;

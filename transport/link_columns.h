@@ -1,6 +1,6 @@
 #pragma once
 
-#include "transport/packed_links.h"
+#include "transport/link_products.h"
 
 #include <cstdint>
 #include <span>
@@ -13,7 +13,7 @@ namespace afterglow {
 /// Four bytes a link, and eight a block and sender.
 class LinkColumns {
 public:
-    static constexpr Index block_size = 8192; // receivers
+    static constexpr Index block_size = ColumnLink::block_size; // receivers
 
     /// Copies `links`, of so many senders.
     LinkColumns(const Links& links, Index senders);
@@ -34,10 +34,10 @@ public:
 private:
     Index receivers_, senders_;
     std::vector<std::uint64_t> begin_; // of block b and sender j: b * (senders + 1) + j
-    std::vector<std::uint32_t> entry_; // see pack()
+    std::vector<ColumnLink> entry_;
     std::vector<std::uint32_t> count_; // a sender
     Index blocks() const { return (receivers_ + block_size - 1) / block_size; }
-    std::span<const std::uint32_t> segment(Index block, Index sender) const {
+    std::span<const ColumnLink> segment(Index block, Index sender) const {
         const auto at = static_cast<std::size_t>(block * (senders_ + 1) + sender);
         return {entry_.data() + begin_[at], entry_.data() + begin_[at + 1]};
     }

@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "transport/krylov.h"
+#include "transport/link_products.h"
 #include "transport/positivity.h"
 
 #include <algorithm>
@@ -64,19 +65,11 @@ VectorIrradiance LightTransport::apply_links(const std::vector<float>& coefficie
     parallel_for(
         receivers,
         [&](Index i) {
-            LinkSum sum;
-            std::uint32_t sender = ~0u;
-            for (const PackedLink& packed : transfer_.links.row(i)) {
-                const std::uint32_t bits = Links::bits_of(packed);
-                sender += Links::step_of(bits);
-                sum.add(bits, &coefficients[4 * std::size_t{sender}]); // a jump's senders are there, too
-            }
-            std::array<float, 12> padded;
-            sum.store(padded.data());
+            const LinkProduct product = multiply_row(transfer_.links, i, coefficients.data());
             for (std::size_t a = 0; a < 3; ++a)
-                std::copy_n(&padded[4 * a], 3, &field[9 * static_cast<std::size_t>(i) + 3 * a]);
+                std::copy_n(&product[4 * a], 3, &field[9 * static_cast<std::size_t>(i) + 3 * a]);
         },
-        256);
+        32);
     transfer_.push.push(points, levels, 9, field);
     return field;
 }
