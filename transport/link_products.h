@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/types.h"
 #include "transport/packed_links.h"
 
 #include <array>
@@ -10,6 +11,12 @@ namespace afterglow {
 
 /// Products of links and coefficients: for x, y and z of the links, R, G, B and 0 each.
 using LinkProduct = std::array<float, 12>;
+
+/// n . V of a product: R, G, B, 0.
+inline Eigen::Array4f net_irradiance(const float* product, const Vec3& n) {
+    using Map = Eigen::Map<const Eigen::Array4f>;
+    return n.x() * Map(product) + n.y() * Map(product + 4) + n.z() * Map(product + 8);
+}
 
 /// Sum of link times coefficient over a row. `coefficients`: four floats (R, G, B, 0) a sender.
 LinkProduct multiply_row(const Links& links, Index row, const float* coefficients);

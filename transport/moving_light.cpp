@@ -1,7 +1,6 @@
 #include "transport/moving_light.h"
 
 #include "core/parallel.h"
-#include "transport/positivity.h"
 
 #include <algorithm>
 #include <chrono>
@@ -47,6 +46,8 @@ MovingLight::MovingLight(const LightTransport& transport, const Options& options
     norm_ = columns_->norms(weights);
     applied_.resize(4 * static_cast<std::size_t>(transfer.senders()));
     product_.resize(3 * static_cast<std::size_t>(points.size()), Eigen::Vector4f::Zero());
+    coarse_.resize(3 * static_cast<std::size_t>(points.begin(points.levels() - 1)), Eigen::Vector4f::Zero());
+    limiter_.emplace(points, transfer.push);
     field_.resize(9 * static_cast<std::size_t>(points.size()));
 }
 
@@ -56,11 +57,26 @@ std::array<Eigen::Vector4f, 3> MovingLight::pushed(Index i) const {
     std::copy_n(&product_[static_cast<std::size_t>(3 * i)], 3, sum.begin());
     const SparseRows<float>& parents = transport_.transfer().push.parents;
     const auto index = parents.indices(i);
-    const auto weight = parents.values(i);
-    for (std::size_t e = 0; e < index.size(); ++e)
-        for (std::size_t a = 0; a < 3; ++a) // parents are never the last point: no end is passed
-            sum[a] += weight[e] * Eigen::Vector4f::Map(&field_[9 * std::size_t{index[e]} + 3 * a]);
+    const float* const weight = parents.values(i).data();
+    for (std::size_t e = 0; e < index.size(); ++e) {
+        const Eigen::Vector4f* const parent = &coarse_[3 * std::size_t{index[e]}];
+        for (std::size_t a = 0; a < 3; ++a) sum[a] += weight[e] * parent[a];
+    }
     return sum;
+}
+
+/// Levels up to the display level's, as far as they are not of this product already.
+template <class Visit>
+void MovingLight::push_levels(int levels, const Visit& visit) {
+    const PointHierarchy& points = transport_.transfer().points;
+    for (; levels_pushed_ < levels; ++levels_pushed_) {
+        const Index first = points.begin(levels_pushed_);
+        parallel_for(points.end(levels_pushed_) - first, [&](Index k) {
+            const std::array<Eigen::Vector4f, 3> v = pushed(first + k);
+            std::copy_n(v.begin(), 3, &coarse_[static_cast<std::size_t>(3 * (first + k))]);
+            visit(first + k, v);
+        }, 512);
+    }
 }
 
 void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
@@ -68,60 +84,79 @@ void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
         std::copy_n(value[a].data(), 3, &field_[9 * static_cast<std::size_t>(i) + 3 * a]);
 }
 
-void MovingLight::push_levels(int levels) {
-    const PointHierarchy& points = transport_.transfer().points;
-    for (int l = 0; l < levels; ++l)
-        parallel_for(points.end(l) - points.begin(l), [&](Index k) {
-            const Index i = points.begin(l) + k;
-            store(i, pushed(i));
-        }, 1024);
-}
-
 /// All levels, the last in one pass with what is asked of it: its norm, and where it is negative.
 void MovingLight::push_display() {
     const PointHierarchy& points = transport_.transfer().points;
-    push_levels(points.levels() - 1);
+    push_levels(points.levels() - 1, [](Index, const auto&) {});
     const Index first = points.begin(points.levels() - 1), count = static_cast<Index>(points.size()) - first;
-    is_negative_.resize(static_cast<std::size_t>(count));
-    field_norm_ = std::sqrt(parallel_sum(count, 0.0, [&](Index k) {
-        const Index i = first + k;
-        const std::array<Eigen::Vector4f, 3> v = pushed(i);
+    constexpr Index grain = 1024;
+    struct Part {
+        double squares = 0.0;
+        std::vector<std::uint32_t> negative;
+    };
+    std::vector<Part> parts(static_cast<std::size_t>((count + grain - 1) / grain));
+    parallel_ranges(count, grain, [&](Index begin, Index end) {
+        Part& part = parts[static_cast<std::size_t>(begin / grain)];
+        for (Index k = begin; k < end; ++k) {
+            const Index i = first + k;
+            const std::array<Eigen::Vector4f, 3> v = pushed(i);
+            store(i, v);
+            const Vec3 n = points.normal.col(i);
+            const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
+            if (irradiance.minCoeff() < 0.0f) part.negative.push_back(static_cast<std::uint32_t>(i));
+            part.squares += static_cast<double>(
+                (v[0].cwiseAbs2() + v[1].cwiseAbs2() + v[2].cwiseAbs2()).sum());
+        }
+    });
+    parallel_for(first, [&](Index i) {
+        std::array<Eigen::Vector4f, 3> v;
+        std::copy_n(&coarse_[static_cast<std::size_t>(3 * i)], 3, v.begin());
         store(i, v);
-        const Vec3 n = points.normal.col(i);
-        const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
-        is_negative_[static_cast<std::size_t>(k)] = irradiance.head<3>().minCoeff() < 0.0f;
-        return static_cast<double>(v[0].head<3>().squaredNorm() + v[1].head<3>().squaredNorm()
-                                   + v[2].head<3>().squaredNorm());
-    }, 1024));
+    }, 4096);
+    double squares = 0.0;
+    negative_.clear();
+    for (const Part& part : parts) {
+        squares += part.squares;
+        negative_.insert(negative_.end(), part.negative.begin(), part.negative.end());
+    }
+    field_norm_ = std::sqrt(squares);
 }
 
-Radiosity MovingLight::radiosity(const Radiosity& direct) {
+std::vector<float> MovingLight::coefficients(const Radiosity& direct) {
     const TransferOperator& transfer = transport_.transfer();
-    push_levels(transfer.sender_levels);
-    Radiosity sum(direct.size());
-    parallel_for(transfer.senders(), [&](Index m) {
-        const auto at = 3 * static_cast<std::size_t>(m);
-        Rgb::Map(&sum[at]) = Rgb::Map(&direct[at])
-                             + transfer.points.reflectance.col(m).array()
-                                   * net_irradiance(field_, m, transfer.points.normal.col(m));
-    }, 1024);
+    const PointHierarchy& points = transfer.points;
+    levels_pushed_ = 0;
+    std::vector<float> sum(4 * static_cast<std::size_t>(transfer.senders()));
+    push_levels(transfer.sender_levels, [&](Index m, const std::array<Eigen::Vector4f, 3>& v) {
+        const Vec3 n = points.normal.col(m), reflectance = points.reflectance.col(m);
+        const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
+        const float* const d = &direct[3 * static_cast<std::size_t>(m)];
+        float* const b = &sum[4 * static_cast<std::size_t>(m)];
+        for (int c = 0; c < 3; ++c) b[c] = d[c] + reflectance[c] * irradiance[c];
+    });
+    transport_.make_coefficients(sum);
     return sum;
 }
 
 MovingLight::Changes MovingLight::changes(const std::vector<float>& coefficients) const {
     const double tau = waiting_share * options_.tolerance * field_norm_
                        / std::sqrt(static_cast<double>(columns_->links()));
+    const auto tau2 = static_cast<float>(tau * tau);
     constexpr Index grain = 4096;
     const auto senders = static_cast<Index>(norm_.size());
     std::vector<Changes> parts(static_cast<std::size_t>((senders + grain - 1) / grain));
     parallel_ranges(senders, grain, [&](Index begin, Index end) {
         Changes& part = parts[static_cast<std::size_t>(begin / grain)];
         for (auto j = static_cast<std::uint32_t>(begin); j < end; ++j) {
-            const Eigen::Vector4f change =
-                Eigen::Vector4f::Map(&coefficients[4 * j]) - Eigen::Vector4f::Map(&applied_[4 * j]);
-            const double effect2 = static_cast<double>(change.squaredNorm()) * norm_[j] * norm_[j];
-            part.effect += effect2;
-            if (effect2 <= tau * tau * columns_->links_of(j)) continue;
+            const auto now = Eigen::Array4f::Map(&coefficients[4 * std::size_t{j}]);
+            const auto was = Eigen::Array4f::Map(&applied_[4 * std::size_t{j}]);
+            const Eigen::Array4f change = now - was;
+            const float norm2 = norm_[j] * norm_[j];
+            part.both += (norm2 * now * was).cast<double>();
+            part.old += (norm2 * was * was).cast<double>();
+            const float effect2 = norm2 * change.square().sum();
+            part.effect += static_cast<double>(effect2);
+            if (effect2 <= tau2 * static_cast<float>(columns_->links_of(j))) continue;
             part.list.push_back({j, change});
             part.links += columns_->links_of(j);
         }
@@ -131,6 +166,8 @@ MovingLight::Changes MovingLight::changes(const std::vector<float>& coefficients
         all.list.insert(all.list.end(), part.list.begin(), part.list.end());
         all.links += part.links;
         all.effect += part.effect;
+        all.both += part.both;
+        all.old += part.old;
     }
     all.effect = std::sqrt(all.effect);
     return all;
@@ -143,9 +180,11 @@ void MovingLight::start_anew(const Radiosity& direct) {
         if (const auto c = Eigen::Vector4f::Map(&applied_[4 * j]); !c.isZero(0.0f)) all.push_back({j, c});
     std::fill(product_.begin(), product_.end(), Eigen::Vector4f::Zero());
     columns_->add_product(all, product_);
+    levels_pushed_ = 0;
 }
 
 void MovingLight::scale(const Rgb& factor) {
+    levels_pushed_ = 0;
     const Eigen::Vector4f f(factor[0], factor[1], factor[2], 0.0f);
     for (std::size_t j = 0; j < norm_.size(); ++j)
         Eigen::Vector4f::Map(&applied_[4 * j]) = Eigen::Vector4f::Map(&applied_[4 * j]).cwiseProduct(f);
@@ -166,24 +205,13 @@ void MovingLight::follow_intensity(const Spotlight& light) {
     light_ = light;
 }
 
-void MovingLight::follow_brightness(const std::vector<float>& coefficients) {
-    struct Sums {
-        Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
-        Sums& operator+=(const Sums& other) {
-            both += other.both;
-            old += other.old;
-            return *this;
-        }
-    };
-    const auto [both, old] = parallel_sum(static_cast<Index>(norm_.size()), Sums{}, [&](Index k) {
-        const auto j = static_cast<std::size_t>(k);
-        const Eigen::Array4d was = Eigen::Array4f::Map(&applied_[4 * j]).cast<double>() * norm_[j];
-        return Sums{was * Eigen::Array4f::Map(&coefficients[4 * j]).cast<double>() * norm_[j], was * was};
-    }, 4096);
+bool MovingLight::follow_brightness(const Changes& changes) {
     Rgb factor = Rgb::Ones();
     for (int c = 0; c < 3; ++c)
-        if (old[c] > 0.0) factor[c] = static_cast<float>(both[c] / old[c]);
-    if (((factor - 1.0f).abs() > static_cast<float>(options_.tolerance)).any()) scale(factor);
+        if (changes.old[c] > 0.0) factor[c] = static_cast<float>(changes.both[c] / changes.old[c]);
+    if (!((factor - 1.0f).abs() > static_cast<float>(options_.tolerance)).any()) return false;
+    scale(factor);
+    return true;
 }
 
 void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
@@ -194,9 +222,9 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
         watch.add_to(s.links_seconds);
         return;
     }
-    const std::vector<float> coefficients = transport_.coefficients(radiosity(direct));
-    follow_brightness(coefficients);
-    const Changes changed = changes(coefficients);
+    const std::vector<float> coefficients = this->coefficients(direct);
+    Changes changed = changes(coefficients);
+    if (follow_brightness(changed)) changed = changes(coefficients);
     watch.add_to(s.coefficients_seconds);
     s.settled = changed.effect <= options_.tolerance * field_norm_;
     if (s.settled) return;
@@ -206,6 +234,7 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
         s.settled = s.anew = true;
     } else {
         columns_->add_product(changed.list, product_);
+        levels_pushed_ = 0;
         for (const LinkColumns::Change& change : changed.list)
             std::copy_n(&coefficients[4 * change.sender], 4, &applied_[4 * change.sender]);
     }
@@ -230,9 +259,8 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
         const double norm_before = field_norm_;
         follow_round(direct, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
-        const TransferOperator& transfer = transport_.transfer();
         push_display();
-        make_positive(transfer.points, transfer.push, is_negative_, field_);
+        (*limiter_)(negative_, field_);
         // What was small beside the field as it was may not be beside a darker one.
         if (field_norm_ < 0.9 * norm_before) s.settled = s.anew;
         watch.add_to(s.push_seconds);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "transport/link_columns.h"
+#include "transport/positivity.h"
 #include "transport/transfer_operator.h"
 
 #include <array>
@@ -55,16 +56,22 @@ private:
     std::vector<float> norm_;                // |T_j|, as it counts at the display level
     std::vector<float> applied_;             // c as it was multiplied, four floats a sender
     std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each
+    std::vector<Eigen::Vector4f> coarse_;    // the same of the levels before the display level, pushed
+    int levels_pushed_ = 0;                  // that hold the product as it is
     VectorIrradiance field_;
-    std::vector<std::uint8_t> is_negative_;  // a display point each: its irradiance, before make_positive()
+    std::optional<PositivityLimiter> limiter_;
+    std::vector<std::uint32_t> negative_; // display points whose irradiance is below zero without limiter_
     double field_norm_ = 0.0; // |field| at the display level
     std::optional<Spotlight> light_; // of the last pose
 
-    Radiosity radiosity(const Radiosity& direct);
+    /// Of the radiosity that the product and direct light make.
+    std::vector<float> coefficients(const Radiosity& direct);
     struct Changes {
         std::vector<LinkColumns::Change> list; // those that cannot wait
         std::uint64_t links = 0;               // of these
         double effect = 0.0;                   // of all changes on the field, root of the sum of squares
+        /// Sums of new times old coefficients and of old ones squared, each as it counts in the field.
+        Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
     };
     Changes changes(const std::vector<float>& coefficients) const;
     class Stopwatch;
@@ -72,11 +79,13 @@ private:
     void start_anew(const Radiosity& direct);
     /// Of a light that changes its intensity alone, all is known.
     void follow_intensity(const Spotlight& light);
-    void follow_brightness(const std::vector<float>& coefficients);
+    /// Of a light that grows brighter or darker as a whole, most is known; whether something changed.
+    bool follow_brightness(const Changes& changes);
     void scale(const Rgb& factor);
     std::array<Eigen::Vector4f, 3> pushed(Index i) const;
     void store(Index i, const std::array<Eigen::Vector4f, 3>& value);
-    void push_levels(int levels);
+    template <class Visit>
+    void push_levels(int levels, const Visit& visit);
     void push_display();
 };
 
