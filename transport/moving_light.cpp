@@ -33,28 +33,47 @@ private:
 
 MovingLight::MovingLight(const LightTransport& transport, const Options& options)
     : transport_(transport), options_(options) {
-    const TransferOperator& transfer = transport.transfer();
-    if (transfer.kind != OperatorKind::neumann || transfer.bounces != 0) return;
-    const PointHierarchy& points = transfer.points;
-    columns_.emplace(transfer.links, transfer.senders());
-    // What a receiver has, all points of the display level around it get by the push.
-    std::vector<float> weights(points.size());
-    for (int l = 0; l < points.levels(); ++l) {
-        const float ratio = points.spacing[l] / points.spacing.back();
-        std::fill(weights.begin() + points.begin(l), weights.begin() + points.end(l), ratio * ratio);
-    }
-    norm_ = columns_->norms(weights);
-    applied_.resize(4 * static_cast<std::size_t>(transfer.senders()));
-    product_.resize(3 * static_cast<std::size_t>(points.size()), Eigen::Vector4f::Zero());
-    coarse_.resize(3 * static_cast<std::size_t>(points.begin(points.levels() - 1)), Eigen::Vector4f::Zero());
-    limiter_.emplace(points, transfer.push);
+    if (!follows()) return;
+    const PointHierarchy& points = transport.transfer().points;
+    const std::size_t coarse = points.begin(points.levels() - 1);
+    product_.resize(3 * coarse, Eigen::Vector4f::Zero());
+    coarse_.resize(3 * coarse, Eigen::Vector4f::Zero());
     field_.resize(9 * static_cast<std::size_t>(points.size()));
 }
 
-/// The product at a point, and what the level above predicts: x, y, z, of which R, G, B count.
-std::array<Eigen::Vector4f, 3> MovingLight::pushed(Index i) const {
-    std::array<Eigen::Vector4f, 3> sum;
-    std::copy_n(&product_[static_cast<std::size_t>(3 * i)], 3, sum.begin());
+bool MovingLight::follows() const {
+    const TransferOperator& transfer = transport_.transfer();
+    return transfer.kind == OperatorKind::neumann && transfer.bounces == 0
+           && transfer.sender_levels < transfer.points.levels();
+}
+
+std::vector<MovingLight::Part> MovingLight::make_parts(const TransferOperator& transfer) {
+    const PointHierarchy& points = transfer.points;
+    std::vector<Part> parts;
+    for (int l = 0; l + 1 < points.levels(); ++l) {
+        LinkColumns columns(transfer.links, transfer.senders(), points.begin(l), points.end(l));
+        // What a receiver has, all points of the display level around it get by the push.
+        const float ratio = points.spacing[l] / points.spacing.back();
+        std::vector<float> norm2 =
+            columns.norms(std::vector<float>(points.end(l) - points.begin(l), ratio * ratio));
+        for (float& norm : norm2) norm *= norm;
+        parts.push_back({std::move(columns), std::move(norm2), {}});
+    }
+    return parts;
+}
+
+void MovingLight::await_parts() {
+    if (!coming_parts_.valid()) return;
+    parts_ = coming_parts_.get();
+    links_ = 0;
+    for (Part& part : parts_) {
+        part.applied = coefficients_;
+        links_ += part.columns.links();
+    }
+}
+
+/// Adds what the level above predicts at a point: x, y, z, of which R, G, B count.
+void MovingLight::add_prediction(Index i, std::array<Eigen::Vector4f, 3>& sum) const {
     const SparseRows<float>& parents = transport_.transfer().push.parents;
     const auto index = parents.indices(i);
     const float* const weight = parents.values(i).data();
@@ -62,7 +81,6 @@ std::array<Eigen::Vector4f, 3> MovingLight::pushed(Index i) const {
         const Eigen::Vector4f* const parent = &coarse_[3 * std::size_t{index[e]}];
         for (std::size_t a = 0; a < 3; ++a) sum[a] += weight[e] * parent[a];
     }
-    return sum;
 }
 
 /// Levels up to the display level's, as far as they are not of this product already.
@@ -72,7 +90,9 @@ void MovingLight::push_levels(int levels, const Visit& visit) {
     for (; levels_pushed_ < levels; ++levels_pushed_) {
         const Index first = points.begin(levels_pushed_);
         parallel_for(points.end(levels_pushed_) - first, [&](Index k) {
-            const std::array<Eigen::Vector4f, 3> v = pushed(first + k);
+            std::array<Eigen::Vector4f, 3> v;
+            std::copy_n(&product_[static_cast<std::size_t>(3 * (first + k))], 3, v.begin());
+            add_prediction(first + k, v);
             std::copy_n(v.begin(), 3, &coarse_[static_cast<std::size_t>(3 * (first + k))]);
             visit(first + k, v);
         }, 512);
@@ -86,25 +106,33 @@ void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
 
 /// All levels, the last in one pass with what is asked of it: its norm, and where it is negative.
 void MovingLight::push_display() {
-    const PointHierarchy& points = transport_.transfer().points;
+    const TransferOperator& transfer = transport_.transfer();
+    const PointHierarchy& points = transfer.points;
     push_levels(points.levels() - 1, [](Index, const auto&) {});
     const Index first = points.begin(points.levels() - 1), count = static_cast<Index>(points.size()) - first;
     constexpr Index grain = 1024;
-    struct Part {
+    struct Chunk {
         double squares = 0.0;
         std::vector<std::uint32_t> negative;
     };
-    std::vector<Part> parts(static_cast<std::size_t>((count + grain - 1) / grain));
+    std::vector<Chunk> chunks(static_cast<std::size_t>((count + grain - 1) / grain));
     parallel_ranges(count, grain, [&](Index begin, Index end) {
-        Part& part = parts[static_cast<std::size_t>(begin / grain)];
+        Chunk& chunk = chunks[static_cast<std::size_t>(begin / grain)];
         for (Index k = begin; k < end; ++k) {
             const Index i = first + k;
-            const std::array<Eigen::Vector4f, 3> v = pushed(i);
+            std::array<Eigen::Vector4f, 3> v;
+            if (transfer.links.row(i).empty()) {
+                v.fill(Eigen::Vector4f::Zero());
+            } else {
+                const LinkProduct product = multiply_row(transfer.links, i, coefficients_.data());
+                for (std::size_t a = 0; a < 3; ++a) v[a] = Eigen::Vector4f::Map(&product[4 * a]);
+            }
+            add_prediction(i, v);
             store(i, v);
             const Vec3 n = points.normal.col(i);
             const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
-            if (irradiance.minCoeff() < 0.0f) part.negative.push_back(static_cast<std::uint32_t>(i));
-            part.squares += static_cast<double>(
+            if (irradiance.minCoeff() < 0.0f) chunk.negative.push_back(static_cast<std::uint32_t>(i));
+            chunk.squares += static_cast<double>(
                 (v[0].cwiseAbs2() + v[1].cwiseAbs2() + v[2].cwiseAbs2()).sum());
         }
     });
@@ -115,79 +143,111 @@ void MovingLight::push_display() {
     }, 4096);
     double squares = 0.0;
     negative_.clear();
-    for (const Part& part : parts) {
-        squares += part.squares;
-        negative_.insert(negative_.end(), part.negative.begin(), part.negative.end());
+    for (const Chunk& chunk : chunks) {
+        squares += chunk.squares;
+        negative_.insert(negative_.end(), chunk.negative.begin(), chunk.negative.end());
     }
     field_norm_ = std::sqrt(squares);
 }
 
-std::vector<float> MovingLight::coefficients(const Radiosity& direct) {
+void MovingLight::make_coefficients(const Radiosity& direct) {
     const TransferOperator& transfer = transport_.transfer();
     const PointHierarchy& points = transfer.points;
     levels_pushed_ = 0;
-    std::vector<float> sum(4 * static_cast<std::size_t>(transfer.senders()));
-    push_levels(transfer.sender_levels, [&](Index m, const std::array<Eigen::Vector4f, 3>& v) {
+    coefficients_.resize(4 * static_cast<std::size_t>(transfer.senders()));
+    push_levels(std::min(transfer.sender_levels, points.levels() - 1), [&](Index m, const std::array<Eigen::Vector4f, 3>& v) {
         const Vec3 n = points.normal.col(m), reflectance = points.reflectance.col(m);
         const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
         const float* const d = &direct[3 * static_cast<std::size_t>(m)];
-        float* const b = &sum[4 * static_cast<std::size_t>(m)];
+        float* const b = &coefficients_[4 * static_cast<std::size_t>(m)];
         for (int c = 0; c < 3; ++c) b[c] = d[c] + reflectance[c] * irradiance[c];
     });
-    transport_.make_coefficients(sum);
-    return sum;
+    transport_.make_coefficients(coefficients_);
 }
 
-MovingLight::Changes MovingLight::changes(const std::vector<float>& coefficients) const {
-    const double tau = waiting_share * options_.tolerance * field_norm_
-                       / std::sqrt(static_cast<double>(columns_->links()));
+MovingLight::Changes MovingLight::changes() const {
+    const double tau = waiting_share * options_.tolerance * field_norm_ / std::sqrt(static_cast<double>(links_));
     const auto tau2 = static_cast<float>(tau * tau);
-    constexpr Index grain = 4096;
-    const auto senders = static_cast<Index>(norm_.size());
-    std::vector<Changes> parts(static_cast<std::size_t>((senders + grain - 1) / grain));
-    parallel_ranges(senders, grain, [&](Index begin, Index end) {
-        Changes& part = parts[static_cast<std::size_t>(begin / grain)];
+    constexpr Index grain = 2048;
+    const auto senders = static_cast<Index>(coefficients_.size() / 4);
+    const Index chunks = (senders + grain - 1) / grain;
+    std::vector<Changes> some(static_cast<std::size_t>(chunks) * parts_.size());
+    parallel_for(static_cast<Index>(some.size()), [&](Index chunk) {
+        Changes& changes = some[static_cast<std::size_t>(chunk)];
+        changes.list.resize(1);
+        const Part& part = parts_[static_cast<std::size_t>(chunk / chunks)];
+        const Index begin = chunk % chunks * grain, end = std::min(senders, begin + grain);
+        Eigen::Array4f both = Eigen::Array4f::Zero(), old = both, effect = both;
         for (auto j = static_cast<std::uint32_t>(begin); j < end; ++j) {
-            const auto now = Eigen::Array4f::Map(&coefficients[4 * std::size_t{j}]);
-            const auto was = Eigen::Array4f::Map(&applied_[4 * std::size_t{j}]);
-            const Eigen::Array4f change = now - was;
-            const float norm2 = norm_[j] * norm_[j];
-            part.both += (norm2 * now * was).cast<double>();
-            part.old += (norm2 * was * was).cast<double>();
-            const float effect2 = norm2 * change.square().sum();
-            part.effect += static_cast<double>(effect2);
-            if (effect2 <= tau2 * static_cast<float>(columns_->links_of(j))) continue;
-            part.list.push_back({j, change});
-            part.links += columns_->links_of(j);
+            const float norm2 = part.norm2[j];
+            const Eigen::Array4f now = Eigen::Array4f::Map(&coefficients_[4 * std::size_t{j}]);
+            const Eigen::Array4f was = Eigen::Array4f::Map(&part.applied[4 * std::size_t{j}]);
+            const Eigen::Array4f change = now - was, effect2 = norm2 * change.square();
+            both += norm2 * now * was;
+            old += norm2 * was.square();
+            effect += effect2;
+            if (effect2.sum() <= tau2 * static_cast<float>(part.columns.links_of(j))) continue;
+            changes.list[0].push_back({j, change});
+            changes.links += part.columns.links_of(j);
         }
-    });
+        changes.both = both.cast<double>();
+        changes.old = old.cast<double>();
+        changes.effect = effect.cast<double>().sum();
+    }, 1);
     Changes all;
-    for (const Changes& part : parts) {
-        all.list.insert(all.list.end(), part.list.begin(), part.list.end());
-        all.links += part.links;
-        all.effect += part.effect;
-        all.both += part.both;
-        all.old += part.old;
+    all.list.resize(parts_.size());
+    for (std::size_t k = 0; k < some.size(); ++k) {
+        const std::vector<LinkColumns::Change>& list = some[k].list[0];
+        std::vector<LinkColumns::Change>& to = all.list[k / static_cast<std::size_t>(chunks)];
+        to.insert(to.end(), list.begin(), list.end());
+        all.links += some[k].links;
+        all.effect += some[k].effect;
+        all.both += some[k].both;
+        all.old += some[k].old;
     }
     all.effect = std::sqrt(all.effect);
     return all;
 }
 
+void MovingLight::apply(const Changes& changes) {
+    struct Block {
+        std::size_t part;
+        Index block;
+    };
+    std::vector<Block> blocks;
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+        for (Index b = 0; b < parts_[p].columns.blocks(); ++b) blocks.push_back({p, b});
+    const PointHierarchy& points = transport_.transfer().points;
+    parallel_for(static_cast<Index>(blocks.size()), [&](Index k) {
+        const auto [p, block] = blocks[static_cast<std::size_t>(k)];
+        parts_[p].columns.add_product(block, changes.list[p],
+                                      std::span(product_).subspan(3 * std::size_t{points.begin(static_cast<int>(p))}));
+    }, 1);
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+        for (const LinkColumns::Change& change : changes.list[p])
+            std::copy_n(&coefficients_[4 * std::size_t{change.sender}], 4, &parts_[p].applied[4 * std::size_t{change.sender}]);
+    levels_pushed_ = 0;
+}
+
 void MovingLight::start_anew(const Radiosity& direct) {
-    applied_ = transport_.coefficients(transport_.all_bounces(direct));
-    std::vector<LinkColumns::Change> all;
-    for (std::uint32_t j = 0; j < norm_.size(); ++j)
-        if (const auto c = Eigen::Vector4f::Map(&applied_[4 * j]); !c.isZero(0.0f)) all.push_back({j, c});
-    std::fill(product_.begin(), product_.end(), Eigen::Vector4f::Zero());
-    columns_->add_product(all, product_);
+    coefficients_ = transport_.coefficients(transport_.all_bounces(direct));
+    parallel_for(static_cast<Index>(product_.size() / 3), [&](Index i) {
+        const LinkProduct product = multiply_row(transport_.transfer().links, i, coefficients_.data());
+        for (std::size_t a = 0; a < 3; ++a)
+            product_[3 * static_cast<std::size_t>(i) + a] = Eigen::Vector4f::Map(&product[4 * a]);
+    }, 32);
+    for (Part& part : parts_) part.applied = coefficients_;
     levels_pushed_ = 0;
 }
 
 void MovingLight::scale(const Rgb& factor) {
     levels_pushed_ = 0;
     const Eigen::Vector4f f(factor[0], factor[1], factor[2], 0.0f);
-    for (std::size_t j = 0; j < norm_.size(); ++j)
-        Eigen::Vector4f::Map(&applied_[4 * j]) = Eigen::Vector4f::Map(&applied_[4 * j]).cwiseProduct(f);
+    for (Part& part : parts_)
+        parallel_for(static_cast<Index>(part.norm2.size()), [&](Index j) {
+            auto c = Eigen::Vector4f::Map(&part.applied[4 * static_cast<std::size_t>(j)]);
+            c = c.cwiseProduct(f).eval();
+        }, 8192);
     parallel_for(static_cast<Index>(product_.size()), [&](Index k) {
         product_[static_cast<std::size_t>(k)] = product_[static_cast<std::size_t>(k)].cwiseProduct(f);
     }, 8192);
@@ -222,21 +282,19 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
         watch.add_to(s.links_seconds);
         return;
     }
-    const std::vector<float> coefficients = this->coefficients(direct);
-    Changes changed = changes(coefficients);
-    if (follow_brightness(changed)) changed = changes(coefficients);
+    make_coefficients(direct);
+    Changes changed = changes();
+    if (follow_brightness(changed)) changed = changes();
     watch.add_to(s.coefficients_seconds);
     s.settled = changed.effect <= options_.tolerance * field_norm_;
     if (s.settled) return;
-    s.links_share += static_cast<double>(changed.links) / static_cast<double>(columns_->links());
-    if (static_cast<double>(changed.links) > most_links * static_cast<double>(columns_->links())) {
+    const double share = static_cast<double>(changed.links) / static_cast<double>(links_);
+    s.links_share += share;
+    if (share > most_links) {
         start_anew(direct);
         s.settled = s.anew = true;
     } else {
-        columns_->add_product(changed.list, product_);
-        levels_pushed_ = 0;
-        for (const LinkColumns::Change& change : changed.list)
-            std::copy_n(&coefficients[4 * change.sender], 4, &applied_[4 * change.sender]);
+        apply(changed);
     }
     watch.add_to(s.links_seconds);
 }
@@ -244,13 +302,14 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
 const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightStatistics* statistics) {
     MovingLightStatistics s;
     Stopwatch watch;
-    if (!columns_) {
+    if (!follows()) {
         field_ = transport_.indirect(light);
         watch.add_to(s.links_seconds);
         s.settled = s.anew = true;
         if (statistics) *statistics = s;
         return field_;
     }
+    await_parts();
     follow_intensity(light);
     const Radiosity direct = transport_.direct_radiosity(light);
     watch.add_to(s.direct_seconds);
@@ -260,11 +319,17 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
         follow_round(direct, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
         push_display();
-        (*limiter_)(negative_, field_);
+        if (!limiter_ && !negative_.empty()) {
+            const TransferOperator& transfer = transport_.transfer();
+            limiter_.emplace(transfer.points, transfer.push);
+        }
+        if (limiter_) (*limiter_)(negative_, field_);
         // What was small beside the field as it was may not be beside a darker one.
         if (field_norm_ < 0.9 * norm_before) s.settled = s.anew;
         watch.add_to(s.push_seconds);
     }
+    if (parts_.empty())
+        coming_parts_ = std::async(std::launch::async, [&transfer = transport_.transfer()] { return make_parts(transfer); });
     if (statistics) *statistics = s;
     return field_;
 }
