@@ -8,13 +8,11 @@
 namespace afterglow {
 LinkColumns::LinkColumns(const Links& links, Index senders, Index first_row, Index last_row)
     : receivers_(last_row - first_row), senders_(senders),
-      // Few receivers with many links each are work for several threads, too.
-      block_size_(std::clamp<Index>((receivers_ + 3) / 4, 1, block_size)),
       begin_(static_cast<std::size_t>(blocks() * (senders + 1))),
       count_(static_cast<std::size_t>(senders)) {
     const auto for_each_of_block = [&](Index block, const auto& visit) {
-        const Index first = block * block_size_;
-        for (Index i = first; i < std::min(receivers_, first + block_size_); ++i)
+        const Index first = block * block_size;
+        for (Index i = first; i < std::min(receivers_, first + block_size); ++i)
             links.for_each_packed(first_row + i, [&](std::uint32_t sender, std::uint32_t bits) {
                 visit(sender, ColumnLink::pack(i - first, bits));
             });
@@ -47,7 +45,7 @@ void LinkColumns::add_product(std::span<const Change> changes, std::span<Eigen::
 }
 
 void LinkColumns::add_product(Index block, std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {
-    float* const first = to[static_cast<std::size_t>(3 * block * block_size_)].data();
+    float* const first = to[static_cast<std::size_t>(3 * block * block_size)].data();
     const std::uint64_t* const begin = begin_.data() + static_cast<std::size_t>(block * (senders_ + 1));
     // Columns lie apart: what comes soon is fetched, first where its links are, then these.
     constexpr std::size_t far = 24, near = 12;
@@ -68,7 +66,7 @@ std::vector<float> LinkColumns::norms(std::span<const float> weights) const {
         double sum = 0.0;
         for (Index block = 0; block < blocks(); ++block)
             for (const ColumnLink& link : segment(block, sender))
-                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size_ + link.receiver())])
+                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size + link.receiver())])
                        * link.vector().squaredNorm();
         norms[static_cast<std::size_t>(sender)] = static_cast<float>(std::sqrt(sum));
     });

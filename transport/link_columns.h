@@ -31,13 +31,12 @@ public:
     void add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
     /// Of the receivers of one block alone; blocks may be added to at the same time.
     void add_product(Index block, std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
-    Index blocks() const { return (receivers_ + block_size_ - 1) / block_size_; }
+    Index blocks() const { return (receivers_ + block_size - 1) / block_size; }
     /// Square root of sum_i weight_i |link_ij|^2 of each sender; a weight a receiver.
     std::vector<float> norms(std::span<const float> weights) const;
 
 private:
     Index receivers_, senders_;
-    Index block_size_; // receivers a block, block_size at most
     std::vector<std::uint64_t> begin_; // of block b and sender j: b * (senders + 1) + j
     std::vector<ColumnLink> entry_;
     std::vector<std::uint32_t> count_; // a sender

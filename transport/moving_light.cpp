@@ -14,6 +14,9 @@ constexpr double most_links = 0.5;
 /// Of the tolerance, what changes that wait may take: less than all, so that a round that is made
 /// does enough for the light to settle soon.
 constexpr double waiting_share = 0.7;
+/// What is passed on from round to round is the most there was lately: that of a round counts for so much one
+/// later.
+constexpr double forgetting = 0.8;
 
 } // namespace
 
@@ -72,15 +75,40 @@ void MovingLight::await_parts() {
     }
 }
 
-/// Adds what the level above predicts at a point: x, y, z, of which R, G, B count.
-void MovingLight::add_prediction(Index i, std::array<Eigen::Vector4f, 3>& sum) const {
+/// So that their short rows need no steps from sender to sender.
+void MovingLight::unpack_display_links() {
+    const TransferOperator& transfer = transport_.transfer();
+    const Index first = transfer.points.begin(transfer.points.levels() - 1);
+    const Index count = static_cast<Index>(transfer.points.size()) - first;
+    display_begin_.resize(static_cast<std::size_t>(count + 1));
+    parallel_for(count, [&](Index k) {
+        display_begin_[static_cast<std::size_t>(k + 1)] = static_cast<std::uint32_t>(transfer.links.count(first + k, first + k + 1));
+    }, 4096);
+    for (std::size_t k = 1; k < display_begin_.size(); ++k) display_begin_[k] += display_begin_[k - 1];
+    display_links_.resize(display_begin_.back());
+    parallel_for(count, [&](Index k) {
+        DisplayLink* to = display_links_.data() + display_begin_[static_cast<std::size_t>(k)];
+        transfer.links.for_each_packed(first + k, [&](std::uint32_t sender, std::uint32_t bits) { *to++ = {sender, bits}; });
+    }, 4096);
+}
+
+/// A product, and what the level above predicts there: x, y, z.
+inline std::array<Eigen::Vector4f, 3> MovingLight::with_prediction(Index i, const Eigen::Vector4f& px,
+                                                                   const Eigen::Vector4f& py,
+                                                                   const Eigen::Vector4f& pz) const {
     const SparseRows<float>& parents = transport_.transfer().push.parents;
-    const auto index = parents.indices(i);
-    const float* const weight = parents.values(i).data();
-    for (std::size_t e = 0; e < index.size(); ++e) {
-        const Eigen::Vector4f* const parent = &coarse_[3 * std::size_t{index[e]}];
-        for (std::size_t a = 0; a < 3; ++a) sum[a] += weight[e] * parent[a];
+    const std::uint64_t end = parents.begin[static_cast<std::size_t>(i + 1)];
+    const std::uint32_t* const index = parents.index.data();
+    const float* const weight = parents.value.data();
+    const Eigen::Vector4f* const coarse = coarse_.data();
+    Eigen::Vector4f x = px, y = py, z = pz; // not in memory
+    for (std::uint64_t e = parents.begin[static_cast<std::size_t>(i)]; e < end; ++e) {
+        const Eigen::Vector4f* const parent = coarse + 3 * std::size_t{index[e]};
+        x += weight[e] * parent[0];
+        y += weight[e] * parent[1];
+        z += weight[e] * parent[2];
     }
+    return {x, y, z};
 }
 
 /// Levels up to the display level's, as far as they are not of this product already.
@@ -90,11 +118,10 @@ void MovingLight::push_levels(int levels, const Visit& visit) {
     for (; levels_pushed_ < levels; ++levels_pushed_) {
         const Index first = points.begin(levels_pushed_);
         parallel_for(points.end(levels_pushed_) - first, [&](Index k) {
-            std::array<Eigen::Vector4f, 3> v;
-            std::copy_n(&product_[static_cast<std::size_t>(3 * (first + k))], 3, v.begin());
-            add_prediction(first + k, v);
+            const Eigen::Vector4f* const product = &product_[static_cast<std::size_t>(3 * (first + k))];
+            const std::array<Eigen::Vector4f, 3> v = with_prediction(first + k, product[0], product[1], product[2]);
             std::copy_n(v.begin(), 3, &coarse_[static_cast<std::size_t>(3 * (first + k))]);
-            visit(first + k, v);
+            visit(first + k, v.data());
         }, 512);
     }
 }
@@ -106,8 +133,8 @@ void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
 
 /// All levels, the last in one pass with what is asked of it: its norm, and where it is negative.
 void MovingLight::push_display() {
-    const TransferOperator& transfer = transport_.transfer();
-    const PointHierarchy& points = transfer.points;
+    const PointHierarchy& points = transport_.transfer().points;
+    if (display_begin_.empty()) unpack_display_links();
     push_levels(points.levels() - 1, [](Index, const auto&) {});
     const Index first = points.begin(points.levels() - 1), count = static_cast<Index>(points.size()) - first;
     constexpr Index grain = 1024;
@@ -118,16 +145,20 @@ void MovingLight::push_display() {
     std::vector<Chunk> chunks(static_cast<std::size_t>((count + grain - 1) / grain));
     parallel_ranges(count, grain, [&](Index begin, Index end) {
         Chunk& chunk = chunks[static_cast<std::size_t>(begin / grain)];
+        const std::uint32_t* const begins = display_begin_.data();
+        const DisplayLink* const links = display_links_.data();
+        const float* const coefficients = coefficients_.data();
         for (Index k = begin; k < end; ++k) {
             const Index i = first + k;
-            std::array<Eigen::Vector4f, 3> v;
-            if (transfer.links.row(i).empty()) {
-                v.fill(Eigen::Vector4f::Zero());
-            } else {
-                const LinkProduct product = multiply_row(transfer.links, i, coefficients_.data());
-                for (std::size_t a = 0; a < 3; ++a) v[a] = Eigen::Vector4f::Map(&product[4 * a]);
+            Eigen::Vector4f x = Eigen::Vector4f::Zero(), y = x, z = x;
+            for (std::uint32_t e = begins[k]; e < begins[k + 1]; ++e) {
+                const LinkVector link = Links::vector_of(links[e].bits);
+                const Eigen::Vector4f c = Eigen::Vector4f::Map(coefficients + 4 * std::size_t{links[e].sender});
+                x += link.x() * c;
+                y += link.y() * c;
+                z += link.z() * c;
             }
-            add_prediction(i, v);
+            const std::array<Eigen::Vector4f, 3> v = with_prediction(i, x, y, z);
             store(i, v);
             const Vec3 n = points.normal.col(i);
             const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
@@ -153,15 +184,17 @@ void MovingLight::push_display() {
 void MovingLight::make_coefficients(const Radiosity& direct) {
     const TransferOperator& transfer = transport_.transfer();
     const PointHierarchy& points = transfer.points;
-    levels_pushed_ = 0;
     coefficients_.resize(4 * static_cast<std::size_t>(transfer.senders()));
-    push_levels(std::min(transfer.sender_levels, points.levels() - 1), [&](Index m, const std::array<Eigen::Vector4f, 3>& v) {
+    const auto radiate = [&](Index m, const Eigen::Vector4f* v) {
         const Vec3 n = points.normal.col(m), reflectance = points.reflectance.col(m);
         const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
         const float* const d = &direct[3 * static_cast<std::size_t>(m)];
         float* const b = &coefficients_[4 * static_cast<std::size_t>(m)];
         for (int c = 0; c < 3; ++c) b[c] = d[c] + reflectance[c] * irradiance[c];
-    });
+    };
+    const Index known = points.begin(std::min(levels_pushed_, transfer.sender_levels));
+    parallel_for(known, [&](Index m) { radiate(m, &coarse_[static_cast<std::size_t>(3 * m)]); }, 1024);
+    push_levels(transfer.sender_levels, radiate);
     transport_.make_coefficients(coefficients_);
 }
 
@@ -177,7 +210,7 @@ MovingLight::Changes MovingLight::changes() const {
         changes.list.resize(1);
         const Part& part = parts_[static_cast<std::size_t>(chunk / chunks)];
         const Index begin = chunk % chunks * grain, end = std::min(senders, begin + grain);
-        Eigen::Array4f both = Eigen::Array4f::Zero(), old = both, effect = both;
+        Eigen::Array4f both = Eigen::Array4f::Zero(), old = both, effect = both, waiting = both;
         for (auto j = static_cast<std::uint32_t>(begin); j < end; ++j) {
             const float norm2 = part.norm2[j];
             const Eigen::Array4f now = Eigen::Array4f::Map(&coefficients_[4 * std::size_t{j}]);
@@ -186,13 +219,17 @@ MovingLight::Changes MovingLight::changes() const {
             both += norm2 * now * was;
             old += norm2 * was.square();
             effect += effect2;
-            if (effect2.sum() <= tau2 * static_cast<float>(part.columns.links_of(j))) continue;
+            if (effect2.sum() <= tau2 * static_cast<float>(part.columns.links_of(j))) {
+                waiting += effect2;
+                continue;
+            }
             changes.list[0].push_back({j, change});
             changes.links += part.columns.links_of(j);
         }
         changes.both = both.cast<double>();
         changes.old = old.cast<double>();
         changes.effect = effect.cast<double>().sum();
+        changes.waiting = waiting.cast<double>().sum();
     }, 1);
     Changes all;
     all.list.resize(parts_.size());
@@ -202,10 +239,12 @@ MovingLight::Changes MovingLight::changes() const {
         to.insert(to.end(), list.begin(), list.end());
         all.links += some[k].links;
         all.effect += some[k].effect;
+        all.waiting += some[k].waiting;
         all.both += some[k].both;
         all.old += some[k].old;
     }
     all.effect = std::sqrt(all.effect);
+    all.waiting = std::sqrt(all.waiting);
     return all;
 }
 
@@ -274,7 +313,7 @@ bool MovingLight::follow_brightness(const Changes& changes) {
     return true;
 }
 
-void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
+void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& s, Stopwatch& watch) {
     if (field_norm_ == 0.0) { // out of the dark there is nothing to follow
         start_anew(direct);
         s.links_share += 1.0;
@@ -286,6 +325,10 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
     Changes changed = changes();
     if (follow_brightness(changed)) changed = changes();
     watch.add_to(s.coefficients_seconds);
+    if (last.multiplied > 0.0) {
+        const double came = std::sqrt(std::max(0.0, changed.effect * changed.effect - last.waiting * last.waiting));
+        passed_on_ = std::max(came / last.multiplied, forgetting * passed_on_);
+    }
     s.settled = changed.effect <= options_.tolerance * field_norm_;
     if (s.settled) return;
     const double share = static_cast<double>(changed.links) / static_cast<double>(links_);
@@ -295,6 +338,9 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
         s.settled = s.anew = true;
     } else {
         apply(changed);
+        last.waiting = changed.waiting;
+        last.multiplied = std::sqrt(std::max(0.0, changed.effect * changed.effect - changed.waiting * changed.waiting));
+        s.settled = std::hypot(last.waiting, passed_on_ * last.multiplied) <= options_.tolerance * field_norm_;
     }
     watch.add_to(s.links_seconds);
 }
@@ -313,10 +359,11 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
     follow_intensity(light);
     const Radiosity direct = transport_.direct_radiosity(light);
     watch.add_to(s.direct_seconds);
+    LastRound last;
     while (!s.settled && (s.rounds < options_.most_rounds || options_.most_rounds == 0)) {
         ++s.rounds;
         const double norm_before = field_norm_;
-        follow_round(direct, s, watch);
+        follow_round(direct, last, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
         push_display();
         if (!limiter_ && !negative_.empty()) {

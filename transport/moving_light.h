@@ -36,7 +36,7 @@ struct MovingLightStatistics {
 /// small. A column of a level's links T_j waits while |change of c_j| |T_j| < tau sqrt(links of T_j), tau = 0.7
 /// tolerance |T c| / sqrt(all links), so that all that wait together change the field's root mean square
 /// by less than 0.7 `tolerance` of it. The light has settled when all changes together are below the
-/// tolerance. The display level's links are few, and all multiplied when a pose ends.
+/// tolerance, or would be in the next round by what rounds have passed on to the next so far. The display level's links are few, and all multiplied when a pose ends.
 class MovingLight {
 public:
     struct Options {
@@ -64,6 +64,11 @@ private:
     std::vector<Part> parts_; // of all levels but the display level; empty before the second pose
     std::future<std::vector<Part>> coming_parts_;
     std::uint64_t links_ = 0;                // of all parts
+    struct DisplayLink {
+        std::uint32_t sender, bits; // the latter as of a PackedLink
+    };
+    std::vector<std::uint32_t> display_begin_; // of a display point each, and the end; empty before the first pose
+    std::vector<DisplayLink> display_links_;
     std::vector<float> coefficients_;        // the newest
     std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each
     std::vector<Eigen::Vector4f> coarse_;    // the same of the levels before the display level, pushed
@@ -71,6 +76,8 @@ private:
     VectorIrradiance field_;
     std::optional<PositivityLimiter> limiter_;
     std::vector<std::uint32_t> negative_; // display points whose irradiance is below zero without limiter_
+    /// Of what a round multiplied, the share that came again as changes in the next round of the pose.
+    double passed_on_ = 1.0;
     double field_norm_ = 0.0; // |field| at the display level
     std::optional<Spotlight> light_; // of the last pose
 
@@ -80,13 +87,17 @@ private:
         std::vector<std::vector<LinkColumns::Change>> list; // of each part, those that cannot wait
         std::uint64_t links = 0;               // of these
         double effect = 0.0;                   // of all changes on the field, root of the sum of squares
+        double waiting = 0.0;                  // of those that wait
         /// Sums of new times old coefficients and of old ones squared, each as it counts in the field.
         Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
     };
     Changes changes() const;
     void apply(const Changes& changes);
     class Stopwatch;
-    void follow_round(const Radiosity& direct, MovingLightStatistics& statistics, Stopwatch& watch);
+    struct LastRound { // of the pose: what it multiplied, and what was left, as Changes::effect
+        double multiplied = 0.0, waiting = 0.0;
+    };
+    void follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& statistics, Stopwatch& watch);
     void start_anew(const Radiosity& direct);
     /// Of a light that changes its intensity alone, all is known.
     void follow_intensity(const Spotlight& light);
@@ -96,7 +107,9 @@ private:
     bool follows() const;
     static std::vector<Part> make_parts(const TransferOperator& transfer);
     void await_parts();
-    void add_prediction(Index i, std::array<Eigen::Vector4f, 3>& sum) const;
+    void unpack_display_links();
+    std::array<Eigen::Vector4f, 3> with_prediction(Index i, const Eigen::Vector4f& x, const Eigen::Vector4f& y,
+                                                   const Eigen::Vector4f& z) const;
     void store(Index i, const std::array<Eigen::Vector4f, 3>& value);
     template <class Visit>
     void push_levels(int levels, const Visit& visit);
