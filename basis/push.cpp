@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <type_traits>
 
 namespace afterglow {
 namespace {
 
-constexpr int most_channels = 9;
+constexpr int most_channels = 12;
 
 /// values_i += sign * sum_k weight_ik values_k for the points of one level. `fixed`: the number of
 /// channels where it is known when this is compiled, which makes it twice as fast; else 0.
@@ -33,14 +34,44 @@ void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int any
         1024);
 }
 
+/// Calls visit with the number of channels where it is one that is often used, else with 0, as a type.
+template <class Visit>
+void with_fixed(int channels, const Visit& visit) {
+    switch (channels) {
+    case 3: return visit(std::integral_constant<int, 3>{});
+    case 4: return visit(std::integral_constant<int, 4>{});
+    case 9: return visit(std::integral_constant<int, 9>{});
+    case 12: return visit(std::integral_constant<int, 12>{});
+    default: return visit(std::integral_constant<int, 0>{});
+    }
+}
+
 void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int channels, float sign,
                   std::span<float> values) {
-    if (channels == 9)
-        add_weighted<9>(rows, begin, end, channels, sign, values);
-    else if (channels == 3)
-        add_weighted<3>(rows, begin, end, channels, sign, values);
-    else
-        add_weighted<0>(rows, begin, end, channels, sign, values);
+    with_fixed(channels, [&](auto fixed) {
+        add_weighted<fixed()>(rows, begin, end, channels, sign, values);
+    });
+}
+
+/// values_i = sum_k weight_ik values_k for the points of one level whose rows are not empty.
+template <int fixed>
+void average(const SparseRows<float>& rows, Index begin, Index end, int any_channels, std::span<float> values) {
+    const int channels = fixed > 0 ? fixed : any_channels;
+    parallel_for(
+        end - begin,
+        [&](Index k) {
+            const Index i = begin + k;
+            const auto index = rows.indices(i);
+            const auto weight = rows.values(i);
+            if (index.empty()) return;
+            std::array<float, most_channels> sum{};
+            for (std::size_t e = 0; e < index.size(); ++e) {
+                const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
+                for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
+            }
+            std::copy_n(sum.begin(), channels, &values[static_cast<std::size_t>(i) * channels]);
+        },
+        256);
 }
 
 } // namespace
@@ -77,21 +108,9 @@ PushOperator make_push_operator(const ShepardBasis& basis) {
 void PullOperator::pull(const PointHierarchy& points, int levels, int channels,
                         std::span<float> values) const {
     for (int l = levels - 2; l >= 0; --l)
-        parallel_for(
-            points.end(l) - points.begin(l),
-            [&](Index k) {
-                const Index i = points.begin(l) + k;
-                const auto index = children.indices(i);
-                const auto weight = children.values(i);
-                if (index.empty()) return;
-                std::array<float, most_channels> sum{};
-                for (std::size_t e = 0; e < index.size(); ++e) {
-                    const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
-                    for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
-                }
-                std::copy_n(sum.begin(), channels, &values[static_cast<std::size_t>(i) * channels]);
-            },
-            256);
+        with_fixed(channels, [&](auto fixed) {
+            average<fixed()>(children, points.begin(l), points.end(l), channels, values);
+        });
 }
 
 void PullOperator::update(const PointHierarchy& points, int levels, int channels,

@@ -1,6 +1,5 @@
 #include "transport/direct_light.h"
 
-#include "basis/nearest_points.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
 #include "transport/sender_rows.h"
@@ -18,6 +17,27 @@ constexpr float golden_section = 0.38196601f; // of a turn, between places one a
 
 float radians(float degrees) {
     return degrees * static_cast<float>(EIGEN_PI / 180.0);
+}
+
+/// Where the splatted rays leave, in the unit square; along a Z-order curve, so that rays of one packet are alike.
+std::vector<Vec2> splatted_places() {
+    struct Place {
+        std::uint32_t order;
+        Vec2 u;
+    };
+    std::vector<Place> places(splatted_rays);
+    for (std::uint32_t k = 0; k < splatted_rays; ++k) {
+        const Vec2 u = scrambled_sobol2(k, 17);
+        std::uint32_t order = 0;
+        for (int bit = 0; bit < 12; ++bit)
+            for (int axis = 0; axis < 2; ++axis)
+                order |= (static_cast<std::uint32_t>(u[axis] * 4096.0f) >> bit & 1u) << (2 * bit + axis);
+        places[k] = {order, u};
+    }
+    std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.order < b.order; });
+    std::vector<Vec2> sorted;
+    for (const Place& place : places) sorted.push_back(place.u);
+    return sorted;
 }
 
 /// s(d) / d.
@@ -40,25 +60,48 @@ float sampled_share(const Spotlight& light, float distance, float spacing) {
 DirectLight::DirectLight(const PointHierarchy& points, int level, std::span<const float> areas,
                          const Surface& surface)
     : points_(points), level_(level), areas_(areas), surface_(surface),
-      basis_(points, surface, true, level) {
-    find_neighbours();
+      neighbours_(points.end(level) - points.begin(level)), neighbours_known_(neighbours_.size()),
+      apart_(neighbours_.size()) {
+    for (std::atomic<std::uint16_t>& apart : apart_) apart.store(apart_unknown, std::memory_order_relaxed);
 }
 
-void DirectLight::find_neighbours() {
-    const Index begin = points_.begin(level_), count = points_.end(level_) - begin;
-    const NearestPoints nearest(points_.position.middleCols(begin, count));
-    neighbours_.resize(static_cast<std::size_t>(count));
-    parallel_for(count, [&](Index k) {
-        Neighbours& found = neighbours_[static_cast<std::size_t>(k)];
-        found.fill(static_cast<std::uint32_t>(k));
-        std::vector<std::uint32_t> near;
-        nearest.closest(points_.position.col(begin + k), 2 * static_cast<int>(found.size()), near);
-        std::size_t n = 0;
-        for (const std::uint32_t other : near)
-            if (other != k && n < found.size()
-                && points_.normal.col(begin + other).dot(points_.normal.col(begin + k)) > 0.5f)
-                found[n++] = other;
+const NearestPoints& DirectLight::nearest() const {
+    std::call_once(nearest_made_, [&] {
+        const Index begin = points_.begin(level_), count = points_.end(level_) - begin;
+        nearest_ = std::make_unique<NearestPoints>(points_.position.middleCols(begin, count));
     });
+    return *nearest_;
+}
+
+const ShepardBasis& DirectLight::basis() const {
+    std::call_once(basis_made_, [&] { basis_ = std::make_unique<ShepardBasis>(points_, surface_, true, level_); });
+    return *basis_;
+}
+
+void DirectLight::find_neighbours(std::size_t k, Neighbours& found) const {
+    const Index begin = points_.begin(level_), here = begin + static_cast<Index>(k);
+    found.fill(static_cast<std::uint32_t>(k));
+    std::vector<std::uint32_t> near;
+    nearest().closest(points_.position.col(here), 2 * static_cast<int>(found.size()), near);
+    std::size_t n = 0;
+    for (const std::uint32_t other : near)
+        if (other != k && n < found.size()
+            && points_.normal.col(begin + other).dot(points_.normal.col(here)) > 0.5f)
+            found[n++] = other;
+}
+
+/// Found when they are first asked for. Who asks while another is at it finds them for himself.
+const DirectLight::Neighbours& DirectLight::neighbours(std::size_t k, Neighbours& scratch) const {
+    std::atomic<std::uint8_t>& state = neighbours_known_[k];
+    std::uint8_t was = state.load(std::memory_order_acquire);
+    if (was == known) return neighbours_[k];
+    if (was == unknown && state.compare_exchange_strong(was, at_work)) {
+        find_neighbours(k, neighbours_[k]);
+        state.store(known, std::memory_order_release);
+        return neighbours_[k];
+    }
+    find_neighbours(k, scratch);
+    return scratch;
 }
 
 void DirectLight::radiosity(const Spotlight& light, std::span<float> result) const {
@@ -106,7 +149,8 @@ void DirectLight::sample_points(const Spotlight& light, std::span<Lit> lit,
 
 bool DirectLight::on_edge(std::span<const Lit> lit, std::size_t k) const {
     constexpr float difference = 0.25f;
-    return lit[k].seen != unasked && std::ranges::any_of(neighbours_[k], [&](std::uint32_t other) {
+    Neighbours scratch;
+    return lit[k].seen != unasked && std::ranges::any_of(neighbours(k, scratch), [&](std::uint32_t other) {
         return lit[other].seen != unasked && std::abs(lit[other].seen - lit[k].seen) > difference;
     });
 }
@@ -122,7 +166,7 @@ Rgb DirectLight::mean_irradiance(const Spotlight& light, const Falloff& falloff,
 
     // In the plane of x, a little above it; those behind something do not count.
     std::array<Vec3, count> centre, place, target;
-    std::array<std::uint8_t, count> apart, shadowed;
+    std::array<std::uint8_t, count> shadowed;
     centre.fill(surface_.lifted(x));
     target.fill(light.position);
     for (std::size_t s = 0; s < count; ++s) {
@@ -131,12 +175,19 @@ Rgb DirectLight::mean_irradiance(const Spotlight& light, const Falloff& falloff,
         place[s] = centre[s]
                    + frame.to_world({radius * std::cos(phi), radius * std::sin(phi), lift_share * size});
     }
-    surface_.blocked(centre, place, apart);
+    std::uint16_t apart = apart_[static_cast<std::size_t>(k)].load(std::memory_order_relaxed);
+    if (apart == apart_unknown) {
+        std::array<std::uint8_t, count> blocked;
+        surface_.blocked(centre, place, blocked);
+        apart = 0;
+        for (std::size_t s = 0; s < count; ++s) apart |= static_cast<std::uint16_t>(blocked[s] << s);
+        apart_[static_cast<std::size_t>(k)].store(apart, std::memory_order_relaxed);
+    }
     surface_.blocked(place, target, shadowed);
     Rgb sum = Rgb::Zero();
     int counted = 0;
     for (std::size_t s = 0; s < count; ++s) {
-        if (apart[s]) continue;
+        if (apart >> s & 1) continue;
         ++counted;
         if (!shadowed[s]) sum += unoccluded_irradiance(light, falloff, {place[s], x.normal});
     }
@@ -168,20 +219,20 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
     const float solid_angle = 2.0f * static_cast<float>(EIGEN_PI) * height;
     const Frame frame(light.direction);
     const Falloff falloff_of(light);
+    static const std::vector<Vec2> places = splatted_places();
 
     struct Splat {
         std::vector<BasisEntry> row;
         Rgb power; // reflected [W]
     };
-    std::vector<Splat> splats(splatted_rays);
     constexpr Index packet = 64;
+    std::vector<std::vector<Splat>> splats(splatted_rays / packet); // in the order of the rays
     parallel_ranges(splatted_rays, packet, [&](Index first, Index last) {
         std::array<Ray, packet> rays;
         std::array<float, packet> falloff;
         std::array<Hit, packet> hits;
         for (Index k = first; k < last; ++k) {
-            const Vec2 u = scrambled_sobol2(static_cast<std::uint32_t>(k), 17);
-            const Vec3 local = sample_cone(u, height);
+            const Vec3 local = sample_cone(places[static_cast<std::size_t>(k)], height);
             rays[k - first] = {light.position, frame.to_world(local), farthest};
             falloff[k - first] = falloff_of(local.z());
         }
@@ -192,19 +243,20 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
             const float splatted =
                 hit ? falloff[k - first] * (1.0f - share_of_scale(scale * hit.distance)) : 0.0f;
             if (splatted == 0.0f) continue;
-            Splat& splat = splats[k];
-            sender_row(surface_, basis_, level_, hit, splat.row);
+            Splat& splat = splats[static_cast<std::size_t>(first / packet)].emplace_back();
+            sender_row(surface_, basis(), level_, hit, splat.row);
             splat.power = (splatted * solid_angle / splatted_rays) * light.intensity
                           * surface_.reflectance(hit);
         }
     });
     const std::uint32_t begin = points_.begin(level_);
-    for (const Splat& splat : splats)
-        for (const BasisEntry& entry : splat.row) {
-            const std::size_t j = entry.index - begin;
-            if (areas_[j] > 0.0f)
-                Rgb::Map(&result[3 * j]) += (entry.value / areas_[j]) * splat.power;
-        }
+    for (const std::vector<Splat>& some : splats)
+        for (const Splat& splat : some)
+            for (const BasisEntry& entry : splat.row) {
+                const std::size_t j = entry.index - begin;
+                if (areas_[j] > 0.0f)
+                    Rgb::Map(&result[3 * j]) += (entry.value / areas_[j]) * splat.power;
+            }
 }
 
 } // namespace afterglow

@@ -1,11 +1,15 @@
 #pragma once
 
+#include "basis/nearest_points.h"
 #include "basis/shepard_basis.h"
 #include "core/surface.h"
 #include "transport/spotlight.h"
 
 #include <array>
+#include <atomic>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -44,9 +48,17 @@ private:
     int level_;
     std::span<const float> areas_;
     const Surface& surface_;
-    ShepardBasis basis_;
+    // What few lights ask of few points is made when it is first asked for.
+    mutable std::once_flag nearest_made_, basis_made_;
+    mutable std::unique_ptr<const NearestPoints> nearest_;
+    mutable std::unique_ptr<const ShepardBasis> basis_;
     using Neighbours = std::array<std::uint32_t, 12>; // counted from the level's first; itself if fewer
-    std::vector<Neighbours> neighbours_;             // closest points that face the same side
+    mutable std::vector<Neighbours> neighbours_;      // closest points that face the same side
+    enum Known : std::uint8_t { unknown, at_work, known };
+    mutable std::vector<std::atomic<std::uint8_t>> neighbours_known_;
+    /// A bit for each of the places around a point: whether it is behind something.
+    mutable std::vector<std::atomic<std::uint16_t>> apart_;
+    static constexpr std::uint16_t apart_unknown = 1 << 15;
 
     /// A sender's share of E(x) that is seen, and what it is of.
     struct Lit {
@@ -55,7 +67,10 @@ private:
     };
     static constexpr float unasked = -1.0f; // where the light is behind, or only splatted
 
-    void find_neighbours();
+    const NearestPoints& nearest() const;
+    const ShepardBasis& basis() const;
+    void find_neighbours(std::size_t k, Neighbours& found) const;
+    const Neighbours& neighbours(std::size_t k, Neighbours& scratch) const;
     void sample_points(const Spotlight& light, std::span<Lit> lit, std::span<float> result) const;
     bool on_edge(std::span<const Lit> lit, std::size_t k) const;
     /// Mean of E around a point [W/m^2].

@@ -6,37 +6,22 @@
 #include <cmath>
 
 namespace afterglow {
-namespace {
-
-// An entry: the receiver within its block, 13 bits, then from bit 13 on what bits 7 to 23 of a
-// PackedLink are: exponent, x, y and z.
-static_assert(LinkColumns::block_size == 1 << 13);
-
-std::uint32_t pack(Index receiver, std::uint32_t bits) {
-    return static_cast<std::uint32_t>(receiver) | (bits >> 7) << 13;
-}
-Index receiver_of(std::uint32_t entry) { return entry & 8191u; }
-std::uint32_t bits_of(std::uint32_t entry) { return (entry >> 13) << 7; }
-LinkVector vector_of(std::uint32_t entry) { return Links::vector_of(bits_of(entry)); }
-
-} // namespace
-
-LinkColumns::LinkColumns(const Links& links, Index senders)
-    : receivers_(links.rows()), senders_(senders),
+LinkColumns::LinkColumns(const Links& links, Index senders, Index first_row, Index last_row)
+    : receivers_(last_row - first_row), senders_(senders),
       begin_(static_cast<std::size_t>(blocks() * (senders + 1))),
       count_(static_cast<std::size_t>(senders)) {
     const auto for_each_of_block = [&](Index block, const auto& visit) {
         const Index first = block * block_size;
         for (Index i = first; i < std::min(receivers_, first + block_size); ++i)
-            links.for_each_packed(i, [&](std::uint32_t sender, std::uint32_t bits) {
-                visit(sender, pack(i - first, bits));
+            links.for_each_packed(first_row + i, [&](std::uint32_t sender, std::uint32_t bits) {
+                visit(sender, ColumnLink::pack(i - first, bits));
             });
     };
     // How many of each sender, then where they begin, then the entries themselves.
     const auto per_block = static_cast<std::size_t>(senders + 1);
     parallel_for(blocks(), [&](Index block) {
         std::uint64_t* count = &begin_[static_cast<std::size_t>(block) * per_block];
-        for_each_of_block(block, [&](std::uint32_t sender, std::uint32_t) { ++count[sender]; });
+        for_each_of_block(block, [&](std::uint32_t sender, ColumnLink) { ++count[sender]; });
     }, 1);
     std::uint64_t total = 0;
     for (std::size_t k = 0; k < begin_.size(); ++k) {
@@ -49,23 +34,30 @@ LinkColumns::LinkColumns(const Links& links, Index senders)
     parallel_for(blocks(), [&](Index block) {
         const auto first = begin_.begin() + static_cast<std::ptrdiff_t>(static_cast<std::size_t>(block) * per_block);
         std::vector<std::uint64_t> next(first, first + static_cast<std::ptrdiff_t>(per_block));
-        for_each_of_block(block, [&](std::uint32_t sender, std::uint32_t entry) {
+        for_each_of_block(block, [&](std::uint32_t sender, ColumnLink entry) {
             entry_[next[sender]++] = entry;
         });
     }, 1);
 }
 
 void LinkColumns::add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {
-    parallel_for(blocks(), [&](Index block) {
-        float* const first = to[static_cast<std::size_t>(3 * block * block_size)].data();
-        for (const Change& change : changes)
-            for (const std::uint32_t entry : segment(block, change.sender)) {
-                float* const at = first + 12 * receiver_of(entry);
-                LinkSum sum(at);
-                sum.add(bits_of(entry), change.coefficients.data());
-                sum.store(at);
-            }
-    }, 1);
+    parallel_for(blocks(), [&](Index block) { add_product(block, changes, to); }, 1);
+}
+
+void LinkColumns::add_product(Index block, std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {
+    float* const first = to[static_cast<std::size_t>(3 * block * block_size)].data();
+    const std::uint64_t* const begin = begin_.data() + static_cast<std::size_t>(block * (senders_ + 1));
+    // Columns lie apart: what comes soon is fetched, first where its links are, then these.
+    constexpr std::size_t far = 24, near = 12;
+    for (std::size_t k = 0; k < changes.size(); ++k) {
+        if (k + far < changes.size()) __builtin_prefetch(begin + changes[k + far].sender);
+        if (k + near < changes.size()) {
+            const ColumnLink* const links = entry_.data() + begin[changes[k + near].sender];
+            __builtin_prefetch(links);
+            __builtin_prefetch(links + 16);
+        }
+        add_column(segment(block, changes[k].sender), changes[k].coefficients.data(), first);
+    }
 }
 
 std::vector<float> LinkColumns::norms(std::span<const float> weights) const {
@@ -73,9 +65,9 @@ std::vector<float> LinkColumns::norms(std::span<const float> weights) const {
     parallel_for(senders_, [&](Index sender) {
         double sum = 0.0;
         for (Index block = 0; block < blocks(); ++block)
-            for (const std::uint32_t entry : segment(block, sender))
-                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size + receiver_of(entry))])
-                       * vector_of(entry).squaredNorm();
+            for (const ColumnLink& link : segment(block, sender))
+                sum += static_cast<double>(weights[static_cast<std::size_t>(block * block_size + link.receiver())])
+                       * link.vector().squaredNorm();
         norms[static_cast<std::size_t>(sender)] = static_cast<float>(std::sqrt(sum));
     });
     return norms;

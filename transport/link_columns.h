@@ -1,6 +1,6 @@
 #pragma once
 
-#include "transport/packed_links.h"
+#include "transport/link_products.h"
 
 #include <cstdint>
 #include <span>
@@ -13,10 +13,11 @@ namespace afterglow {
 /// Four bytes a link, and eight a block and sender.
 class LinkColumns {
 public:
-    static constexpr Index block_size = 8192; // receivers
+    static constexpr Index block_size = ColumnLink::block_size; // receivers
 
-    /// Copies `links`, of so many senders.
-    LinkColumns(const Links& links, Index senders);
+    /// Copies the links of the rows [first, last), which are its receivers, from so many senders.
+    LinkColumns(const Links& links, Index senders, Index first, Index last);
+    LinkColumns(const Links& links, Index senders) : LinkColumns(links, senders, 0, links.rows()) {}
 
     std::uint64_t links() const { return entry_.size(); }
     std::uint32_t links_of(Index sender) const { return count_[static_cast<std::size_t>(sender)]; }
@@ -28,16 +29,18 @@ public:
     /// to[3 i + a] += sum of link_ij[a] * change_j over the changes j, for all receivers i and axes a.
     /// Changes must rise by sender. The same bits at any number of threads.
     void add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
+    /// Of the receivers of one block alone; blocks may be added to at the same time.
+    void add_product(Index block, std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
+    Index blocks() const { return (receivers_ + block_size - 1) / block_size; }
     /// Square root of sum_i weight_i |link_ij|^2 of each sender; a weight a receiver.
     std::vector<float> norms(std::span<const float> weights) const;
 
 private:
     Index receivers_, senders_;
     std::vector<std::uint64_t> begin_; // of block b and sender j: b * (senders + 1) + j
-    std::vector<std::uint32_t> entry_; // see pack()
+    std::vector<ColumnLink> entry_;
     std::vector<std::uint32_t> count_; // a sender
-    Index blocks() const { return (receivers_ + block_size - 1) / block_size; }
-    std::span<const std::uint32_t> segment(Index block, Index sender) const {
+    std::span<const ColumnLink> segment(Index block, Index sender) const {
         const auto at = static_cast<std::size_t>(block * (senders_ + 1) + sender);
         return {entry_.data() + begin_[at], entry_.data() + begin_[at + 1]};
     }

@@ -1,7 +1,6 @@
 #include "transport/moving_light.h"
 
 #include "core/parallel.h"
-#include "transport/positivity.h"
 
 #include <algorithm>
 #include <chrono>
@@ -15,6 +14,9 @@ constexpr double most_links = 0.5;
 /// Of the tolerance, what changes that wait may take: less than all, so that a round that is made
 /// does enough for the light to settle soon.
 constexpr double waiting_share = 0.7;
+/// What is passed on from round to round is the most there was lately: that of a round counts for so much one
+/// later.
+constexpr double forgetting = 0.8;
 
 } // namespace
 
@@ -34,33 +36,94 @@ private:
 
 MovingLight::MovingLight(const LightTransport& transport, const Options& options)
     : transport_(transport), options_(options) {
-    const TransferOperator& transfer = transport.transfer();
-    if (transfer.kind != OperatorKind::neumann || transfer.bounces != 0) return;
-    const PointHierarchy& points = transfer.points;
-    columns_.emplace(transfer.links, transfer.senders());
-    // What a receiver has, all points of the display level around it get by the push.
-    std::vector<float> weights(points.size());
-    for (int l = 0; l < points.levels(); ++l) {
-        const float ratio = points.spacing[l] / points.spacing.back();
-        std::fill(weights.begin() + points.begin(l), weights.begin() + points.end(l), ratio * ratio);
-    }
-    norm_ = columns_->norms(weights);
-    applied_.resize(4 * static_cast<std::size_t>(transfer.senders()));
-    product_.resize(3 * static_cast<std::size_t>(points.size()), Eigen::Vector4f::Zero());
+    if (!follows()) return;
+    const PointHierarchy& points = transport.transfer().points;
+    const std::size_t coarse = points.begin(points.levels() - 1);
+    product_.resize(3 * coarse, Eigen::Vector4f::Zero());
+    coarse_.resize(3 * coarse, Eigen::Vector4f::Zero());
     field_.resize(9 * static_cast<std::size_t>(points.size()));
 }
 
-/// The product at a point, and what the level above predicts: x, y, z, of which R, G, B count.
-std::array<Eigen::Vector4f, 3> MovingLight::pushed(Index i) const {
-    std::array<Eigen::Vector4f, 3> sum;
-    std::copy_n(&product_[static_cast<std::size_t>(3 * i)], 3, sum.begin());
+bool MovingLight::follows() const {
+    const TransferOperator& transfer = transport_.transfer();
+    return transfer.kind == OperatorKind::neumann && transfer.bounces == 0
+           && transfer.sender_levels < transfer.points.levels();
+}
+
+std::vector<MovingLight::Part> MovingLight::make_parts(const TransferOperator& transfer) {
+    const PointHierarchy& points = transfer.points;
+    std::vector<Part> parts;
+    for (int l = 0; l + 1 < points.levels(); ++l) {
+        LinkColumns columns(transfer.links, transfer.senders(), points.begin(l), points.end(l));
+        // What a receiver has, all points of the display level around it get by the push.
+        const float ratio = points.spacing[l] / points.spacing.back();
+        std::vector<float> norm2 =
+            columns.norms(std::vector<float>(points.end(l) - points.begin(l), ratio * ratio));
+        for (float& norm : norm2) norm *= norm;
+        parts.push_back({std::move(columns), std::move(norm2), {}});
+    }
+    return parts;
+}
+
+void MovingLight::await_parts() {
+    if (!coming_parts_.valid()) return;
+    parts_ = coming_parts_.get();
+    links_ = 0;
+    for (Part& part : parts_) {
+        part.applied = coefficients_;
+        links_ += part.columns.links();
+    }
+}
+
+/// So that their short rows need no steps from sender to sender.
+void MovingLight::unpack_display_links() {
+    const TransferOperator& transfer = transport_.transfer();
+    const Index first = transfer.points.begin(transfer.points.levels() - 1);
+    const Index count = static_cast<Index>(transfer.points.size()) - first;
+    display_begin_.resize(static_cast<std::size_t>(count + 1));
+    parallel_for(count, [&](Index k) {
+        display_begin_[static_cast<std::size_t>(k + 1)] = static_cast<std::uint32_t>(transfer.links.count(first + k, first + k + 1));
+    }, 4096);
+    for (std::size_t k = 1; k < display_begin_.size(); ++k) display_begin_[k] += display_begin_[k - 1];
+    display_links_.resize(display_begin_.back());
+    parallel_for(count, [&](Index k) {
+        DisplayLink* to = display_links_.data() + display_begin_[static_cast<std::size_t>(k)];
+        transfer.links.for_each_packed(first + k, [&](std::uint32_t sender, std::uint32_t bits) { *to++ = {sender, bits}; });
+    }, 4096);
+}
+
+/// A product, and what the level above predicts there: x, y, z.
+inline std::array<Eigen::Vector4f, 3> MovingLight::with_prediction(Index i, const Eigen::Vector4f& px,
+                                                                   const Eigen::Vector4f& py,
+                                                                   const Eigen::Vector4f& pz) const {
     const SparseRows<float>& parents = transport_.transfer().push.parents;
-    const auto index = parents.indices(i);
-    const auto weight = parents.values(i);
-    for (std::size_t e = 0; e < index.size(); ++e)
-        for (std::size_t a = 0; a < 3; ++a) // parents are never the last point: no end is passed
-            sum[a] += weight[e] * Eigen::Vector4f::Map(&field_[9 * std::size_t{index[e]} + 3 * a]);
-    return sum;
+    const std::uint64_t end = parents.begin[static_cast<std::size_t>(i + 1)];
+    const std::uint32_t* const index = parents.index.data();
+    const float* const weight = parents.value.data();
+    const Eigen::Vector4f* const coarse = coarse_.data();
+    Eigen::Vector4f x = px, y = py, z = pz; // not in memory
+    for (std::uint64_t e = parents.begin[static_cast<std::size_t>(i)]; e < end; ++e) {
+        const Eigen::Vector4f* const parent = coarse + 3 * std::size_t{index[e]};
+        x += weight[e] * parent[0];
+        y += weight[e] * parent[1];
+        z += weight[e] * parent[2];
+    }
+    return {x, y, z};
+}
+
+/// Levels up to the display level's, as far as they are not of this product already.
+template <class Visit>
+void MovingLight::push_levels(int levels, const Visit& visit) {
+    const PointHierarchy& points = transport_.transfer().points;
+    for (; levels_pushed_ < levels; ++levels_pushed_) {
+        const Index first = points.begin(levels_pushed_);
+        parallel_for(points.end(levels_pushed_) - first, [&](Index k) {
+            const Eigen::Vector4f* const product = &product_[static_cast<std::size_t>(3 * (first + k))];
+            const std::array<Eigen::Vector4f, 3> v = with_prediction(first + k, product[0], product[1], product[2]);
+            std::copy_n(v.begin(), 3, &coarse_[static_cast<std::size_t>(3 * (first + k))]);
+            visit(first + k, v.data());
+        }, 512);
+    }
 }
 
 void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
@@ -68,87 +131,162 @@ void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
         std::copy_n(value[a].data(), 3, &field_[9 * static_cast<std::size_t>(i) + 3 * a]);
 }
 
-void MovingLight::push_levels(int levels) {
-    const PointHierarchy& points = transport_.transfer().points;
-    for (int l = 0; l < levels; ++l)
-        parallel_for(points.end(l) - points.begin(l), [&](Index k) {
-            const Index i = points.begin(l) + k;
-            store(i, pushed(i));
-        }, 1024);
-}
-
 /// All levels, the last in one pass with what is asked of it: its norm, and where it is negative.
 void MovingLight::push_display() {
     const PointHierarchy& points = transport_.transfer().points;
-    push_levels(points.levels() - 1);
+    if (display_begin_.empty()) unpack_display_links();
+    push_levels(points.levels() - 1, [](Index, const auto&) {});
     const Index first = points.begin(points.levels() - 1), count = static_cast<Index>(points.size()) - first;
-    is_negative_.resize(static_cast<std::size_t>(count));
-    field_norm_ = std::sqrt(parallel_sum(count, 0.0, [&](Index k) {
-        const Index i = first + k;
-        const std::array<Eigen::Vector4f, 3> v = pushed(i);
-        store(i, v);
-        const Vec3 n = points.normal.col(i);
-        const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
-        is_negative_[static_cast<std::size_t>(k)] = irradiance.head<3>().minCoeff() < 0.0f;
-        return static_cast<double>(v[0].head<3>().squaredNorm() + v[1].head<3>().squaredNorm()
-                                   + v[2].head<3>().squaredNorm());
-    }, 1024));
-}
-
-Radiosity MovingLight::radiosity(const Radiosity& direct) {
-    const TransferOperator& transfer = transport_.transfer();
-    push_levels(transfer.sender_levels);
-    Radiosity sum(direct.size());
-    parallel_for(transfer.senders(), [&](Index m) {
-        const auto at = 3 * static_cast<std::size_t>(m);
-        Rgb::Map(&sum[at]) = Rgb::Map(&direct[at])
-                             + transfer.points.reflectance.col(m).array()
-                                   * net_irradiance(field_, m, transfer.points.normal.col(m));
-    }, 1024);
-    return sum;
-}
-
-MovingLight::Changes MovingLight::changes(const std::vector<float>& coefficients) const {
-    const double tau = waiting_share * options_.tolerance * field_norm_
-                       / std::sqrt(static_cast<double>(columns_->links()));
-    constexpr Index grain = 4096;
-    const auto senders = static_cast<Index>(norm_.size());
-    std::vector<Changes> parts(static_cast<std::size_t>((senders + grain - 1) / grain));
-    parallel_ranges(senders, grain, [&](Index begin, Index end) {
-        Changes& part = parts[static_cast<std::size_t>(begin / grain)];
-        for (auto j = static_cast<std::uint32_t>(begin); j < end; ++j) {
-            const Eigen::Vector4f change =
-                Eigen::Vector4f::Map(&coefficients[4 * j]) - Eigen::Vector4f::Map(&applied_[4 * j]);
-            const double effect2 = static_cast<double>(change.squaredNorm()) * norm_[j] * norm_[j];
-            part.effect += effect2;
-            if (effect2 <= tau * tau * columns_->links_of(j)) continue;
-            part.list.push_back({j, change});
-            part.links += columns_->links_of(j);
+    constexpr Index grain = 1024;
+    struct Chunk {
+        double squares = 0.0;
+        std::vector<std::uint32_t> negative;
+    };
+    std::vector<Chunk> chunks(static_cast<std::size_t>((count + grain - 1) / grain));
+    parallel_ranges(count, grain, [&](Index begin, Index end) {
+        Chunk& chunk = chunks[static_cast<std::size_t>(begin / grain)];
+        const std::uint32_t* const begins = display_begin_.data();
+        const DisplayLink* const links = display_links_.data();
+        const float* const coefficients = coefficients_.data();
+        for (Index k = begin; k < end; ++k) {
+            const Index i = first + k;
+            Eigen::Vector4f x = Eigen::Vector4f::Zero(), y = x, z = x;
+            for (std::uint32_t e = begins[k]; e < begins[k + 1]; ++e) {
+                const LinkVector link = Links::vector_of(links[e].bits);
+                const Eigen::Vector4f c = Eigen::Vector4f::Map(coefficients + 4 * std::size_t{links[e].sender});
+                x += link.x() * c;
+                y += link.y() * c;
+                z += link.z() * c;
+            }
+            const std::array<Eigen::Vector4f, 3> v = with_prediction(i, x, y, z);
+            store(i, v);
+            const Vec3 n = points.normal.col(i);
+            const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
+            if (irradiance.minCoeff() < 0.0f) chunk.negative.push_back(static_cast<std::uint32_t>(i));
+            chunk.squares += static_cast<double>(
+                (v[0].cwiseAbs2() + v[1].cwiseAbs2() + v[2].cwiseAbs2()).sum());
         }
     });
+    parallel_for(first, [&](Index i) {
+        std::array<Eigen::Vector4f, 3> v;
+        std::copy_n(&coarse_[static_cast<std::size_t>(3 * i)], 3, v.begin());
+        store(i, v);
+    }, 4096);
+    double squares = 0.0;
+    negative_.clear();
+    for (const Chunk& chunk : chunks) {
+        squares += chunk.squares;
+        negative_.insert(negative_.end(), chunk.negative.begin(), chunk.negative.end());
+    }
+    field_norm_ = std::sqrt(squares);
+}
+
+void MovingLight::make_coefficients(const Radiosity& direct) {
+    const TransferOperator& transfer = transport_.transfer();
+    const PointHierarchy& points = transfer.points;
+    coefficients_.resize(4 * static_cast<std::size_t>(transfer.senders()));
+    const auto radiate = [&](Index m, const Eigen::Vector4f* v) {
+        const Vec3 n = points.normal.col(m), reflectance = points.reflectance.col(m);
+        const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
+        const float* const d = &direct[3 * static_cast<std::size_t>(m)];
+        float* const b = &coefficients_[4 * static_cast<std::size_t>(m)];
+        for (int c = 0; c < 3; ++c) b[c] = d[c] + reflectance[c] * irradiance[c];
+    };
+    const Index known = points.begin(std::min(levels_pushed_, transfer.sender_levels));
+    parallel_for(known, [&](Index m) { radiate(m, &coarse_[static_cast<std::size_t>(3 * m)]); }, 1024);
+    push_levels(transfer.sender_levels, radiate);
+    transport_.make_coefficients(coefficients_);
+}
+
+MovingLight::Changes MovingLight::changes() const {
+    const double tau = waiting_share * options_.tolerance * field_norm_ / std::sqrt(static_cast<double>(links_));
+    const auto tau2 = static_cast<float>(tau * tau);
+    constexpr Index grain = 2048;
+    const auto senders = static_cast<Index>(coefficients_.size() / 4);
+    const Index chunks = (senders + grain - 1) / grain;
+    std::vector<Changes> some(static_cast<std::size_t>(chunks) * parts_.size());
+    parallel_for(static_cast<Index>(some.size()), [&](Index chunk) {
+        Changes& changes = some[static_cast<std::size_t>(chunk)];
+        changes.list.resize(1);
+        const Part& part = parts_[static_cast<std::size_t>(chunk / chunks)];
+        const Index begin = chunk % chunks * grain, end = std::min(senders, begin + grain);
+        Eigen::Array4f both = Eigen::Array4f::Zero(), old = both, effect = both, waiting = both;
+        for (auto j = static_cast<std::uint32_t>(begin); j < end; ++j) {
+            const float norm2 = part.norm2[j];
+            const Eigen::Array4f now = Eigen::Array4f::Map(&coefficients_[4 * std::size_t{j}]);
+            const Eigen::Array4f was = Eigen::Array4f::Map(&part.applied[4 * std::size_t{j}]);
+            const Eigen::Array4f change = now - was, effect2 = norm2 * change.square();
+            both += norm2 * now * was;
+            old += norm2 * was.square();
+            effect += effect2;
+            if (effect2.sum() <= tau2 * static_cast<float>(part.columns.links_of(j))) {
+                waiting += effect2;
+                continue;
+            }
+            changes.list[0].push_back({j, change});
+            changes.links += part.columns.links_of(j);
+        }
+        changes.both = both.cast<double>();
+        changes.old = old.cast<double>();
+        changes.effect = effect.cast<double>().sum();
+        changes.waiting = waiting.cast<double>().sum();
+    }, 1);
     Changes all;
-    for (const Changes& part : parts) {
-        all.list.insert(all.list.end(), part.list.begin(), part.list.end());
-        all.links += part.links;
-        all.effect += part.effect;
+    all.list.resize(parts_.size());
+    for (std::size_t k = 0; k < some.size(); ++k) {
+        const std::vector<LinkColumns::Change>& list = some[k].list[0];
+        std::vector<LinkColumns::Change>& to = all.list[k / static_cast<std::size_t>(chunks)];
+        to.insert(to.end(), list.begin(), list.end());
+        all.links += some[k].links;
+        all.effect += some[k].effect;
+        all.waiting += some[k].waiting;
+        all.both += some[k].both;
+        all.old += some[k].old;
     }
     all.effect = std::sqrt(all.effect);
+    all.waiting = std::sqrt(all.waiting);
     return all;
 }
 
+void MovingLight::apply(const Changes& changes) {
+    struct Block {
+        std::size_t part;
+        Index block;
+    };
+    std::vector<Block> blocks;
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+        for (Index b = 0; b < parts_[p].columns.blocks(); ++b) blocks.push_back({p, b});
+    const PointHierarchy& points = transport_.transfer().points;
+    parallel_for(static_cast<Index>(blocks.size()), [&](Index k) {
+        const auto [p, block] = blocks[static_cast<std::size_t>(k)];
+        parts_[p].columns.add_product(block, changes.list[p],
+                                      std::span(product_).subspan(3 * std::size_t{points.begin(static_cast<int>(p))}));
+    }, 1);
+    for (std::size_t p = 0; p < parts_.size(); ++p)
+        for (const LinkColumns::Change& change : changes.list[p])
+            std::copy_n(&coefficients_[4 * std::size_t{change.sender}], 4, &parts_[p].applied[4 * std::size_t{change.sender}]);
+    levels_pushed_ = 0;
+}
+
 void MovingLight::start_anew(const Radiosity& direct) {
-    applied_ = transport_.coefficients(transport_.all_bounces(direct));
-    std::vector<LinkColumns::Change> all;
-    for (std::uint32_t j = 0; j < norm_.size(); ++j)
-        if (const auto c = Eigen::Vector4f::Map(&applied_[4 * j]); !c.isZero(0.0f)) all.push_back({j, c});
-    std::fill(product_.begin(), product_.end(), Eigen::Vector4f::Zero());
-    columns_->add_product(all, product_);
+    coefficients_ = transport_.coefficients(transport_.all_bounces(direct));
+    parallel_for(static_cast<Index>(product_.size() / 3), [&](Index i) {
+        const LinkProduct product = multiply_row(transport_.transfer().links, i, coefficients_.data());
+        for (std::size_t a = 0; a < 3; ++a)
+            product_[3 * static_cast<std::size_t>(i) + a] = Eigen::Vector4f::Map(&product[4 * a]);
+    }, 32);
+    for (Part& part : parts_) part.applied = coefficients_;
+    levels_pushed_ = 0;
 }
 
 void MovingLight::scale(const Rgb& factor) {
+    levels_pushed_ = 0;
     const Eigen::Vector4f f(factor[0], factor[1], factor[2], 0.0f);
-    for (std::size_t j = 0; j < norm_.size(); ++j)
-        Eigen::Vector4f::Map(&applied_[4 * j]) = Eigen::Vector4f::Map(&applied_[4 * j]).cwiseProduct(f);
+    for (Part& part : parts_)
+        parallel_for(static_cast<Index>(part.norm2.size()), [&](Index j) {
+            auto c = Eigen::Vector4f::Map(&part.applied[4 * static_cast<std::size_t>(j)]);
+            c = c.cwiseProduct(f).eval();
+        }, 8192);
     parallel_for(static_cast<Index>(product_.size()), [&](Index k) {
         product_[static_cast<std::size_t>(k)] = product_[static_cast<std::size_t>(k)].cwiseProduct(f);
     }, 8192);
@@ -166,27 +304,16 @@ void MovingLight::follow_intensity(const Spotlight& light) {
     light_ = light;
 }
 
-void MovingLight::follow_brightness(const std::vector<float>& coefficients) {
-    struct Sums {
-        Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
-        Sums& operator+=(const Sums& other) {
-            both += other.both;
-            old += other.old;
-            return *this;
-        }
-    };
-    const auto [both, old] = parallel_sum(static_cast<Index>(norm_.size()), Sums{}, [&](Index k) {
-        const auto j = static_cast<std::size_t>(k);
-        const Eigen::Array4d was = Eigen::Array4f::Map(&applied_[4 * j]).cast<double>() * norm_[j];
-        return Sums{was * Eigen::Array4f::Map(&coefficients[4 * j]).cast<double>() * norm_[j], was * was};
-    }, 4096);
+bool MovingLight::follow_brightness(const Changes& changes) {
     Rgb factor = Rgb::Ones();
     for (int c = 0; c < 3; ++c)
-        if (old[c] > 0.0) factor[c] = static_cast<float>(both[c] / old[c]);
-    if (((factor - 1.0f).abs() > static_cast<float>(options_.tolerance)).any()) scale(factor);
+        if (changes.old[c] > 0.0) factor[c] = static_cast<float>(changes.both[c] / changes.old[c]);
+    if (!((factor - 1.0f).abs() > static_cast<float>(options_.tolerance)).any()) return false;
+    scale(factor);
+    return true;
 }
 
-void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
+void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& s, Stopwatch& watch) {
     if (field_norm_ == 0.0) { // out of the dark there is nothing to follow
         start_anew(direct);
         s.links_share += 1.0;
@@ -194,20 +321,26 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
         watch.add_to(s.links_seconds);
         return;
     }
-    const std::vector<float> coefficients = transport_.coefficients(radiosity(direct));
-    follow_brightness(coefficients);
-    const Changes changed = changes(coefficients);
+    make_coefficients(direct);
+    Changes changed = changes();
+    if (follow_brightness(changed)) changed = changes();
     watch.add_to(s.coefficients_seconds);
+    if (last.multiplied > 0.0) {
+        const double came = std::sqrt(std::max(0.0, changed.effect * changed.effect - last.waiting * last.waiting));
+        passed_on_ = std::max(came / last.multiplied, forgetting * passed_on_);
+    }
     s.settled = changed.effect <= options_.tolerance * field_norm_;
     if (s.settled) return;
-    s.links_share += static_cast<double>(changed.links) / static_cast<double>(columns_->links());
-    if (static_cast<double>(changed.links) > most_links * static_cast<double>(columns_->links())) {
+    const double share = static_cast<double>(changed.links) / static_cast<double>(links_);
+    s.links_share += share;
+    if (share > most_links) {
         start_anew(direct);
         s.settled = s.anew = true;
     } else {
-        columns_->add_product(changed.list, product_);
-        for (const LinkColumns::Change& change : changed.list)
-            std::copy_n(&coefficients[4 * change.sender], 4, &applied_[4 * change.sender]);
+        apply(changed);
+        last.waiting = changed.waiting;
+        last.multiplied = std::sqrt(std::max(0.0, changed.effect * changed.effect - changed.waiting * changed.waiting));
+        s.settled = std::hypot(last.waiting, passed_on_ * last.multiplied) <= options_.tolerance * field_norm_;
     }
     watch.add_to(s.links_seconds);
 }
@@ -215,28 +348,35 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
 const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightStatistics* statistics) {
     MovingLightStatistics s;
     Stopwatch watch;
-    if (!columns_) {
+    if (!follows()) {
         field_ = transport_.indirect(light);
         watch.add_to(s.links_seconds);
         s.settled = s.anew = true;
         if (statistics) *statistics = s;
         return field_;
     }
+    await_parts();
     follow_intensity(light);
     const Radiosity direct = transport_.direct_radiosity(light);
     watch.add_to(s.direct_seconds);
+    LastRound last;
     while (!s.settled && (s.rounds < options_.most_rounds || options_.most_rounds == 0)) {
         ++s.rounds;
         const double norm_before = field_norm_;
-        follow_round(direct, s, watch);
+        follow_round(direct, last, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
-        const TransferOperator& transfer = transport_.transfer();
         push_display();
-        make_positive(transfer.points, transfer.push, is_negative_, field_);
+        if (!limiter_ && !negative_.empty()) {
+            const TransferOperator& transfer = transport_.transfer();
+            limiter_.emplace(transfer.points, transfer.push);
+        }
+        if (limiter_) (*limiter_)(negative_, field_);
         // What was small beside the field as it was may not be beside a darker one.
         if (field_norm_ < 0.9 * norm_before) s.settled = s.anew;
         watch.add_to(s.push_seconds);
     }
+    if (parts_.empty())
+        coming_parts_ = std::async(std::launch::async, [&transfer = transport_.transfer()] { return make_parts(transfer); });
     if (statistics) *statistics = s;
     return field_;
 }

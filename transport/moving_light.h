@@ -1,10 +1,12 @@
 #pragma once
 
 #include "transport/link_columns.h"
+#include "transport/positivity.h"
 #include "transport/transfer_operator.h"
 
 #include <array>
 #include <cstdint>
+#include <future>
 #include <optional>
 #include <vector>
 
@@ -30,9 +32,11 @@ struct MovingLightStatistics {
 /// their columns of T, and the product is corrected. So the light of further bounces is at most a few
 /// poses old, and comes to rest with the light: rounds are the Neumann series, from the last pose on.
 ///
-/// A column waits while |change of c_j| |T_j| < tau sqrt(links of j), tau = 0.7 tolerance |T c| /
-/// sqrt(all links), so that all that wait together change the field's root mean square by less than 0.7
-/// `tolerance` of it. The light has settled when all changes together are below the tolerance.
+/// The links to each level of receivers are multiplied by themselves: those to coarse levels are many and
+/// small. A column of a level's links T_j waits while |change of c_j| |T_j| < tau sqrt(links of T_j), tau = 0.7
+/// tolerance |T c| / sqrt(all links), so that all that wait together change the field's root mean square
+/// by less than 0.7 `tolerance` of it. The light has settled when all changes together are below the
+/// tolerance, or would be in the next round by what rounds have passed on to the next so far. The display level's links are few, and all multiplied when a pose ends.
 class MovingLight {
 public:
     struct Options {
@@ -40,43 +44,75 @@ public:
         int most_rounds = 0; // a pose; 0: until it has settled
     };
 
-    /// Keeps a reference. Copies the links: 4 bytes each.
+    /// Keeps a reference. Links are copied after the first pose, in the background: 4 bytes each.
     MovingLight(const LightTransport& transport, const Options& options);
 
     /// Indirect vector irradiance at all points under the light, until the next call. The same poses in
     /// the same order give the same bits at any number of threads. Of operators without further
-    /// columns (the paper's, or with a given number of bounces) it is LightTransport::indirect.
+    /// columns (the paper's, or with a given number of bounces, or whose senders are displayed) it is LightTransport::indirect.
     const VectorIrradiance& follow(const Spotlight& light, MovingLightStatistics* statistics = nullptr);
 
 private:
     const LightTransport& transport_;
     Options options_;
-    std::optional<LinkColumns> columns_;
-    std::vector<float> norm_;                // |T_j|, as it counts at the display level
-    std::vector<float> applied_;             // c as it was multiplied, four floats a sender
+    /// The links to the receivers of one level.
+    struct Part {
+        LinkColumns columns;
+        std::vector<float> norm2;   // |T_j|^2, as it counts at the display level
+        std::vector<float> applied; // c as it was multiplied, four floats a sender
+    };
+    std::vector<Part> parts_; // of all levels but the display level; empty before the second pose
+    std::future<std::vector<Part>> coming_parts_;
+    std::uint64_t links_ = 0;                // of all parts
+    struct DisplayLink {
+        std::uint32_t sender, bits; // the latter as of a PackedLink
+    };
+    std::vector<std::uint32_t> display_begin_; // of a display point each, and the end; empty before the first pose
+    std::vector<DisplayLink> display_links_;
+    std::vector<float> coefficients_;        // the newest
     std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each
+    std::vector<Eigen::Vector4f> coarse_;    // the same of the levels before the display level, pushed
+    int levels_pushed_ = 0;                  // that hold the product as it is
     VectorIrradiance field_;
-    std::vector<std::uint8_t> is_negative_;  // a display point each: its irradiance, before make_positive()
+    std::optional<PositivityLimiter> limiter_;
+    std::vector<std::uint32_t> negative_; // display points whose irradiance is below zero without limiter_
+    /// Of what a round multiplied, the share that came again as changes in the next round of the pose.
+    double passed_on_ = 1.0;
     double field_norm_ = 0.0; // |field| at the display level
     std::optional<Spotlight> light_; // of the last pose
 
-    Radiosity radiosity(const Radiosity& direct);
+    /// Of the radiosity that the product and direct light make.
+    void make_coefficients(const Radiosity& direct);
     struct Changes {
-        std::vector<LinkColumns::Change> list; // those that cannot wait
+        std::vector<std::vector<LinkColumns::Change>> list; // of each part, those that cannot wait
         std::uint64_t links = 0;               // of these
         double effect = 0.0;                   // of all changes on the field, root of the sum of squares
+        double waiting = 0.0;                  // of those that wait
+        /// Sums of new times old coefficients and of old ones squared, each as it counts in the field.
+        Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
     };
-    Changes changes(const std::vector<float>& coefficients) const;
+    Changes changes() const;
+    void apply(const Changes& changes);
     class Stopwatch;
-    void follow_round(const Radiosity& direct, MovingLightStatistics& statistics, Stopwatch& watch);
+    struct LastRound { // of the pose: what it multiplied, and what was left, as Changes::effect
+        double multiplied = 0.0, waiting = 0.0;
+    };
+    void follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& statistics, Stopwatch& watch);
     void start_anew(const Radiosity& direct);
     /// Of a light that changes its intensity alone, all is known.
     void follow_intensity(const Spotlight& light);
-    void follow_brightness(const std::vector<float>& coefficients);
+    /// Of a light that grows brighter or darker as a whole, most is known; whether something changed.
+    bool follow_brightness(const Changes& changes);
     void scale(const Rgb& factor);
-    std::array<Eigen::Vector4f, 3> pushed(Index i) const;
+    bool follows() const;
+    static std::vector<Part> make_parts(const TransferOperator& transfer);
+    void await_parts();
+    void unpack_display_links();
+    std::array<Eigen::Vector4f, 3> with_prediction(Index i, const Eigen::Vector4f& x, const Eigen::Vector4f& y,
+                                                   const Eigen::Vector4f& z) const;
     void store(Index i, const std::array<Eigen::Vector4f, 3>& value);
-    void push_levels(int levels);
+    template <class Visit>
+    void push_levels(int levels, const Visit& visit);
     void push_display();
 };
 

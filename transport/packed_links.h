@@ -146,49 +146,4 @@ struct Links {
     }
 };
 
-/// Products of links and coefficients, summed up: for x, y and z of the links, R, G, B and 0 each.
-class LinkSum {
-public:
-    LinkSum() = default;
-    /// From twelve floats, x.R, x.G, x.B, 0, y.R ...
-    explicit LinkSum(const float* from);
-    void store(float* to) const;
-    /// bits: an entry's, the step ignored; of a jump nothing is added. coefficients: four floats.
-    void add(std::uint32_t bits, const float* coefficients);
-
-private:
-#ifdef __AVX2__
-    __m256 xy_ = _mm256_setzero_ps();
-    __m128 z_ = _mm_setzero_ps();
-#else
-    Eigen::Array<float, 4, 3> sum_ = Eigen::Array<float, 4, 3>::Zero();
-#endif
-};
-
-#ifdef __AVX2__
-inline LinkSum::LinkSum(const float* from) : xy_(_mm256_loadu_ps(from)), z_(_mm_loadu_ps(from + 8)) {}
-inline void LinkSum::store(float* to) const {
-    _mm256_storeu_ps(to, xy_);
-    _mm_storeu_ps(to + 8, z_);
-}
-inline void LinkSum::add(std::uint32_t bits, const float* coefficients) {
-    // Each component's four bits to the top of its lanes, then down again with their sign.
-    const __m256i all = _mm256_set1_epi32(static_cast<int>(bits));
-    const __m256i top = _mm256_sllv_epi32(all, _mm256_setr_epi32(16, 16, 16, 16, 12, 12, 12, 12));
-    const __m256 xy = _mm256_cvtepi32_ps(_mm256_srai_epi32(top, 28));
-    const __m128 z = _mm_cvtepi32_ps(_mm_srai_epi32(_mm_slli_epi32(_mm256_castsi256_si128(all), 8), 28));
-    const __m256 c = _mm256_mul_ps(_mm256_set1_ps(LinkPacker::step_of(bits >> 7 & 31u)),
-                                   _mm256_broadcast_ps(reinterpret_cast<const __m128*>(coefficients)));
-    xy_ = _mm256_add_ps(xy_, _mm256_mul_ps(xy, c));
-    z_ = _mm_add_ps(z_, _mm_mul_ps(z, _mm256_castps256_ps128(c)));
-}
-#else
-inline LinkSum::LinkSum(const float* from) : sum_(Eigen::Array<float, 4, 3>::Map(from)) {}
-inline void LinkSum::store(float* to) const { Eigen::Array<float, 4, 3>::Map(to) = sum_; }
-inline void LinkSum::add(std::uint32_t bits, const float* coefficients) {
-    const LinkVector link = Links::vector_of(bits);
-    for (int a = 0; a < 3; ++a) sum_.col(a) += link[a] * Eigen::Array4f::Map(coefficients);
-}
-#endif
-
 } // namespace afterglow

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace afterglow {
 
@@ -22,9 +23,35 @@ namespace afterglow {
 /// nothing is negative.
 void make_positive(const PointHierarchy& points, const PushOperator& push, VectorIrradiance& field);
 
-/// The same where it is known already at which points of the display level, in their order, it is below
-/// zero.
-void make_positive(const PointHierarchy& points, const PushOperator& push, std::span<const std::uint8_t> is_negative,
-                   VectorIrradiance& field);
+/// The same for one hierarchy again and again, where it is known already which points of the display level
+/// are below zero: it touches no others than these and those that they take from.
+class PositivityLimiter {
+public:
+    /// Keeps references.
+    PositivityLimiter(const PointHierarchy& points, const PushOperator& push);
+    /// `negative`: the points, rising.
+    void operator()(std::span<const std::uint32_t> negative, VectorIrradiance& field);
+
+private:
+    const PointHierarchy& points_;
+    const PushOperator& push_;
+    /// A point of the display level below a parent, with its share.
+    struct Child {
+        std::uint32_t point;
+        float weight;
+    };
+    std::uint32_t first_parent_, first_point_; // what the following are counted from
+    std::vector<std::uint32_t> child_begin_;   // a parent each, and the end
+    std::vector<Child> child_;
+    struct Parent {
+        std::uint32_t id;
+        Rgb share; // what its points lose of their irradiance
+    };
+    std::vector<std::uint32_t> slot_;          // a parent each, its place in taken_; `none` between calls
+    std::vector<Parent> taken_;
+    std::vector<std::uint8_t> changes_;        // a point each; zero between calls
+    std::vector<std::uint32_t> changed_;
+    static constexpr std::uint32_t none = ~0u;
+};
 
 } // namespace afterglow

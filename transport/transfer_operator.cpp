@@ -2,10 +2,12 @@
 
 #include "core/parallel.h"
 #include "transport/krylov.h"
+#include "transport/link_products.h"
 #include "transport/positivity.h"
 
 #include <algorithm>
 #include <array>
+#include <tuple>
 
 namespace afterglow {
 
@@ -47,49 +49,45 @@ Radiosity LightTransport::direct_radiosity(const Spotlight& light) const {
 }
 
 std::vector<float> LightTransport::coefficients(const Radiosity& radiosity) const {
-    const PointHierarchy& points = transfer_.points;
-    std::vector<float> values(radiosity);
-    transfer_.pull.pull(points, transfer_.sender_levels, 3, values);
-    transfer_.push.difference(points, transfer_.sender_levels, 3, values);
-    transfer_.pull.update(points, transfer_.sender_levels, 3, values);
     std::vector<float> padded(4 * static_cast<std::size_t>(transfer_.senders()), 0.0f);
-    parallel_for(transfer_.senders(), [&](Index m) { std::copy_n(&values[3 * m], 3, &padded[4 * m]); }, 4096);
+    parallel_for(transfer_.senders(), [&](Index m) { std::copy_n(&radiosity[3 * m], 3, &padded[4 * m]); }, 4096);
+    make_coefficients(padded);
     return padded;
 }
 
-VectorIrradiance LightTransport::apply_links(const std::vector<float>& coefficients, int levels) const {
+void LightTransport::make_coefficients(std::vector<float>& radiosity) const {
+    const PointHierarchy& points = transfer_.points;
+    transfer_.pull.pull(points, transfer_.sender_levels, 4, radiosity);
+    transfer_.push.difference(points, transfer_.sender_levels, 4, radiosity);
+    transfer_.pull.update(points, transfer_.sender_levels, 4, radiosity);
+}
+
+std::vector<float> LightTransport::apply_links(const std::vector<float>& coefficients, int levels) const {
     const PointHierarchy& points = transfer_.points;
     const Index receivers = points.end(levels - 1);
-    VectorIrradiance field(9 * static_cast<std::size_t>(receivers));
+    constexpr std::size_t channels = std::tuple_size_v<LinkProduct>;
+    std::vector<float> field(channels * static_cast<std::size_t>(receivers));
     parallel_for(
         receivers,
         [&](Index i) {
-            LinkSum sum;
-            std::uint32_t sender = ~0u;
-            for (const PackedLink& packed : transfer_.links.row(i)) {
-                const std::uint32_t bits = Links::bits_of(packed);
-                sender += Links::step_of(bits);
-                sum.add(bits, &coefficients[4 * std::size_t{sender}]); // a jump's senders are there, too
-            }
-            std::array<float, 12> padded;
-            sum.store(padded.data());
-            for (std::size_t a = 0; a < 3; ++a)
-                std::copy_n(&padded[4 * a], 3, &field[9 * static_cast<std::size_t>(i) + 3 * a]);
+            const LinkProduct product = multiply_row(transfer_.links, i, coefficients.data());
+            std::copy_n(product.data(), channels, &field[channels * static_cast<std::size_t>(i)]);
         },
-        256);
-    transfer_.push.push(points, levels, 9, field);
+        32);
+    transfer_.push.push(points, levels, channels, field);
     return field;
 }
 
 Radiosity LightTransport::bounce(const Radiosity& radiosity) const {
     const PointHierarchy& points = transfer_.points;
-    const VectorIrradiance field = apply_links(coefficients(radiosity), transfer_.sender_levels);
+    const std::vector<float> field = apply_links(coefficients(radiosity), transfer_.sender_levels);
     Radiosity next(radiosity.size());
     parallel_for(
         transfer_.senders(),
         [&](Index m) {
             Rgb::Map(&next[3 * static_cast<std::size_t>(m)]) =
-                points.reflectance.col(m).array() * net_irradiance(field, m, points.normal.col(m));
+                points.reflectance.col(m).array()
+                * net_irradiance(&field[12 * static_cast<std::size_t>(m)], points.normal.col(m)).head<3>();
         },
         1024);
     return next;
@@ -113,7 +111,13 @@ Radiosity LightTransport::some_bounces(const Radiosity& direct, int count) const
 }
 
 VectorIrradiance LightTransport::gather(const Radiosity& radiosity) const {
-    return apply_links(coefficients(radiosity), transfer_.points.levels());
+    const std::vector<float> padded = apply_links(coefficients(radiosity), transfer_.points.levels());
+    VectorIrradiance field(9 * static_cast<std::size_t>(transfer_.points.size()));
+    parallel_for(transfer_.points.size(), [&](Index i) {
+        for (std::size_t a = 0; a < 3; ++a)
+            std::copy_n(&padded[12 * static_cast<std::size_t>(i) + 4 * a], 3, &field[9 * static_cast<std::size_t>(i) + 3 * a]);
+    }, 4096);
+    return field;
 }
 
 /// S e, where e are the coefficients of direct irradiance.

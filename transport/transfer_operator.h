@@ -88,6 +88,8 @@ public:
     /// What links are multiplied with: the senders' radiosity pulled, differenced and updated, four
     /// floats a sender (R, G, B, 0).
     std::vector<float> coefficients(const Radiosity& radiosity) const;
+    /// The same in place, of four floats a sender.
+    void make_coefficients(std::vector<float>& radiosity) const;
 
     /// One bounce: radiosity of the sender points by light that left them, M f = rho n . push(T e)
     /// with e the coefficients of f.
@@ -119,7 +121,8 @@ private:
     const TransferOperator& transfer_;
     const Surface& surface_;
     std::optional<DirectLight> direct_light_; // neumann
-    VectorIrradiance apply_links(const std::vector<float>& coefficients, int levels) const;
+    /// T e pushed to the receivers of the first levels, a LinkProduct each.
+    std::vector<float> apply_links(const std::vector<float>& coefficients, int levels) const;
     VectorIrradiance apply_paper(const std::vector<float>& direct_irradiance) const;
 };
 

@@ -173,6 +173,18 @@ struct UpdateOptions {
     double tolerance = MovingLight::Options().tolerance;
 };
 
+/// Milliseconds, the best of many.
+template <class Function>
+double best_milliseconds(const Function& function) {
+    double best = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 40; ++k) {
+        const auto begin = Clock::now();
+        function();
+        best = std::min(best, 1e3 * seconds_since(begin));
+    }
+    return best;
+}
+
 void run_update(const UpdateOptions& options) {
     const auto start = Clock::now();
     const TransferFile file = load_transfer(options.file);
@@ -184,7 +196,7 @@ void run_update(const UpdateOptions& options) {
     MovingLight moving(transport, {.tolerance = options.tolerance});
     const double prepared = seconds_since(ready);
     std::vector<std::array<double, 5>> stages; // direct, coefficients, links, push, all [ms]
-    double first = 0.0, links_share = 0.0, difference = 0.0;
+    double first = 0.0, links_share = 0.0, rounds = 0.0, difference = 0.0;
     for (int frame = 0; frame <= options.frames; ++frame) {
         Spotlight light{.position = options.from + Vec3(0.01f * static_cast<float>(frame), 0.0f, 0.0f),
                         .direction = {-0.2f, -1.0f, 0.1f},
@@ -209,24 +221,26 @@ void run_update(const UpdateOptions& options) {
             continue;
         }
         links_share += s.links_share / options.frames;
+        rounds += static_cast<double>(s.rounds) / options.frames;
         stages.push_back({1e3 * s.direct_seconds, 1e3 * s.coefficients_seconds, 1e3 * s.links_seconds,
                               1e3 * s.push_seconds, 1e3 * s.seconds()});
     }
     // What reading the operator once takes, at the speed of this memory.
     const auto bytes = static_cast<Index>(file.transfer.links.entries() * 4);
     std::vector<std::uint64_t> memory(static_cast<std::size_t>(bytes) / 8, 1);
-    double read = std::numeric_limits<double>::infinity();
-    for (int k = 0; k < 5; ++k) {
-        const auto begin = Clock::now();
+    const double read = best_milliseconds([&] {
         volatile std::uint64_t sum = parallel_sum(static_cast<Index>(memory.size()), std::uint64_t{0},
                                                   [&](Index i) { return memory[static_cast<std::size_t>(i)]; }, 1 << 16);
         (void)sum;
-        read = std::min(read, 1e3 * seconds_since(begin));
-    }
-    std::printf("opened in %.1f ms, prepared in %.1f ms, first update %.1f ms, links read once in %.1f ms\n",
-                1e3 * opened, 1e3 * prepared, first, read);
-    std::printf("%.1f %% of the links multiplied; in the end %.2f %% from all computed anew\n", 100.0 * links_share,
-                100.0 * difference);
+    });
+    const Radiosity flat(3 * static_cast<std::size_t>(file.transfer.senders()), 1.0f);
+    const double bounce = best_milliseconds([&] { transport.bounce(flat); });
+    const double gather = best_milliseconds([&] { transport.gather(flat); });
+    std::printf("opened in %.1f ms, prepared in %.1f ms, first update %.1f ms\n", 1e3 * opened,
+                1e3 * prepared, first);
+    std::printf("links read once in %.1f ms; one bounce %.1f ms, all links and the push %.1f ms\n", read, bounce, gather);
+    std::printf("%.1f %% of the links multiplied in %.1f rounds; in the end %.2f %% from all computed anew\n",
+                100.0 * links_share, rounds, 100.0 * difference);
     const char* names[] = {"direct", "coefficients", "links", "push", "all"};
     for (std::size_t k = 0; k < 5; ++k) {
         std::vector<double> values;
