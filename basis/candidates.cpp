@@ -120,6 +120,7 @@ void CandidateSource::ensure(std::size_t count) {
             paths_at_once,
             [&](Index i) {
                 Path& path = paths[i];
+                path.left.reserve(most_bounces - skipped_bounces);
                 const std::uint64_t id = next_path_ + static_cast<std::uint64_t>(i);
                 Rng rng(seed_, id);
                 Vec3 origin = viewpoints_[id % viewpoints_.size()];

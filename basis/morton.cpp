@@ -20,6 +20,10 @@ std::uint64_t spread_bits(std::uint64_t x) {
 
 } // namespace
 
+std::uint64_t morton_code(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    return spread_bits(x) | spread_bits(y) << 1 | spread_bits(z) << 2;
+}
+
 std::vector<std::uint32_t> morton_order(std::span<const Vec3> positions) {
     Eigen::AlignedBox3f box;
     for (const Vec3& p : positions) box.extend(p);
@@ -27,8 +31,8 @@ std::vector<std::uint32_t> morton_order(std::span<const Vec3> positions) {
     std::vector<std::uint64_t> code(positions.size());
     for (std::size_t i = 0; i < positions.size(); ++i) {
         const Vec3 u = (positions[i] - box.min()) / size;
-        for (int a = 0; a < 3; ++a)
-            code[i] |= spread_bits(static_cast<std::uint64_t>(u[a] * 2097151.0f)) << a;
+        const Eigen::Array<std::uint32_t, 3, 1> cell = (u.array() * 2097151.0f).cast<std::uint32_t>();
+        code[i] = morton_code(cell[0], cell[1], cell[2]);
     }
     std::vector<std::uint32_t> order(positions.size());
     std::iota(order.begin(), order.end(), 0u);

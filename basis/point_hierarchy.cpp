@@ -20,7 +20,8 @@ namespace {
 /// like. `longest`: senders' supports are kept short, as direct light has shadow edges.
 std::vector<float> adaptive_supports(const std::vector<Candidate>& points,
                                      std::span<const Openness> openness, float longest) {
-    constexpr int neighbour = 4, considered = 48;
+    constexpr std::size_t neighbour = 4;
+    constexpr int at_first = 12, at_most = 48; // closest points that are looked at
     Eigen::Matrix3Xf positions(3, points.size());
     for (std::size_t i = 0; i < points.size(); ++i) positions.col(i) = points[i].at.position;
     const NearestPoints nearest(positions);
@@ -28,16 +29,23 @@ std::vector<float> adaptive_supports(const std::vector<Candidate>& points,
     parallel_for(static_cast<Index>(points.size()), [&](Index i) {
         const SurfacePoint& x = points[i].at;
         std::vector<std::uint32_t> near;
-        nearest.closest(x.position, considered, near);
         std::vector<float> distance;
-        for (const std::uint32_t j : near) {
-            const Vec3& n = points[j].at.normal;
-            if (j == static_cast<std::uint32_t>(i) || n.dot(x.normal) < 0.7f) continue;
-            const float d2 = squashed_distance2(points[j].at.position - x.position, n);
-            distance.push_back(std::sqrt(d2)
-                               / openness_likeness(openness_difference2(openness[j], openness[i])));
+        for (int considered = at_first; considered <= at_most; considered *= 2) {
+            nearest.closest(x.position, considered, near);
+            distance.clear();
+            for (const std::uint32_t j : near) {
+                const Vec3& n = points[j].at.normal;
+                if (j == static_cast<std::uint32_t>(i) || n.dot(x.normal) < 0.7f) continue;
+                const float d2 = squashed_distance2(points[j].at.position - x.position, n);
+                distance.push_back(std::sqrt(d2)
+                                   / openness_likeness(openness_difference2(openness[j], openness[i])));
+            }
+            std::sort(distance.begin(), distance.end());
+            // These distances are never shorter than the straight one, by which the points are found.
+            const float fourth = distance.size() >= neighbour ? distance[neighbour - 1] : longest / 1.5f;
+            const float farthest = (points[near.back()].at.position - x.position).norm();
+            if (std::min(fourth, longest / 1.5f) < 0.999f * farthest) break;
         }
-        std::sort(distance.begin(), distance.end());
         support[i] = distance.size() >= neighbour ? std::min(1.5f * distance[neighbour - 1], longest)
                                                   : longest;
     });

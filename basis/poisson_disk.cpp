@@ -1,31 +1,54 @@
 #include "basis/poisson_disk.h"
 
+#include "basis/morton.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
+
+#include <immintrin.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace afterglow {
 namespace {
 
-struct Dart {
-    SurfacePoint at;
-    std::size_t candidate;
-    Openness openness;
-};
-
 struct Cell {
     std::array<std::int32_t, 27> neighbour; // itself included; -1 where nothing is
     int parity;                             // cells of equal parity never touch
-    std::vector<Dart> darts;
+    std::vector<SurfacePoint> darts;        // apart from what is seldom asked of them:
+    std::vector<Openness> openness;         // one a dart
+    std::vector<std::size_t> candidate;     // likewise
     std::vector<std::uint32_t> waiting;     // candidates of this round, by place in the round
 };
 
+/// The cells around a cell, those first that are closest to the points of one eighth of it: there a
+/// conflict is most likely found.
+using CellOrder = std::array<std::int8_t, 27>;
+std::array<CellOrder, 8> closest_first() {
+    std::array<CellOrder, 8> orders;
+    for (int eighth = 0; eighth < 8; ++eighth) {
+        const auto distance2 = [&](int k) {
+            const Vec3 towards(eighth & 1 ? 0.25f : -0.25f, eighth & 2 ? 0.25f : -0.25f,
+                               eighth & 4 ? 0.25f : -0.25f);
+            return (Vec3(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1).cast<float>() - towards).squaredNorm();
+        };
+        std::iota(orders[eighth].begin(), orders[eighth].end(), std::int8_t{0});
+        std::stable_sort(orders[eighth].begin(), orders[eighth].end(),
+                         [&](int a, int b) { return distance2(a) < distance2(b); });
+    }
+    return orders;
+}
+
 using CellKey = std::array<std::int32_t, 3>;
+
+inline void prefetch_line(const void* address) {
+    _mm_prefetch(static_cast<const char*>(address), _MM_HINT_T0);
+}
 
 /// From the place of a cell to its number: open addressing, one cache line a look.
 class CellIndex {
@@ -34,9 +57,12 @@ public:
     std::int32_t find(const CellKey& key) const {
         for (std::size_t k = hash(key);; ++k) {
             const Slot& slot = slots_[k & (slots_.size() - 1)];
-            if (slot.id < 0 || slot.key == key) return slot.id;
+            if (slot.id < 0
+                || (slot.key[0] == key[0] && slot.key[1] == key[1] && slot.key[2] == key[2]))
+                return slot.id;
         }
     }
+    void prefetch(const CellKey& key) const { prefetch_line(&slots_[hash(key) & (slots_.size() - 1)]); }
     /// The key must be new.
     void insert(const CellKey& key, std::int32_t id) {
         if (2 * ++used_ > slots_.size()) {
@@ -80,13 +106,40 @@ public:
                      std::vector<char>& accepted) {
         const std::size_t count = end - begin;
         accepted.assign(count, 0);
-        std::vector<std::optional<Openness>> features(count);
-        // Most conflict with darts of earlier rounds already, in whatever order they are looked at.
+        std::vector<std::optional<Openness>> features(refining ? count : 0);
+        const auto feature_of = [&](std::size_t i) { return refining ? &features[i] : nullptr; };
+        // Most conflict with darts of earlier rounds already, in whatever order they are looked at: one
+        // beside the other, so that what is around is in the cache.
         std::vector<char> fits_so_far(count);
-        parallel_for(static_cast<Index>(count), [&](Index i) {
-            const SurfacePoint& x = source[begin + i].at;
-            const std::int32_t cell = index_.find(key_of(x.position));
-            fits_so_far[i] = cell < 0 || fits(cells_[cell], x, refining, features[i]);
+        std::vector<std::uint64_t> order(count);
+        parallel_for(
+            static_cast<Index>(count),
+            [&](Index i) {
+                const CellKey key = key_of(source[begin + i].at.position);
+                order[i] = morton_code(key[0] & 1023, key[1] & 1023, key[2] & 1023) << 32
+                           | static_cast<std::uint64_t>(i);
+            },
+            1024);
+        parallel_sort(order);
+        constexpr Index at_once = 64; // what they need of memory is asked for before it is used
+        parallel_ranges(static_cast<Index>(count), at_once, [&](Index first, Index last) {
+            const auto candidate = [&](Index k) { return begin + (order[k] & 0xffffffff); };
+            std::array<CellKey, at_once> key;
+            std::array<std::int32_t, at_once> cell;
+            for (Index k = first; k < last; ++k) prefetch_line(&source[candidate(k)].at);
+            for (Index k = first; k < last; ++k) {
+                key[k - first] = key_of(source[candidate(k)].at.position);
+                index_.prefetch(key[k - first]);
+            }
+            for (Index k = first; k < last; ++k) {
+                cell[k - first] = index_.find(key[k - first]);
+                if (cell[k - first] >= 0) prefetch_line(&cells_[cell[k - first]]);
+            }
+            for (Index k = first; k < last; ++k) {
+                const std::size_t i = candidate(k) - begin;
+                const std::int32_t id = cell[k - first];
+                fits_so_far[i] = id < 0 || fits(cells_[id], source[begin + i].at, feature_of(i));
+            }
         });
         std::array<std::vector<std::int32_t>, 8> classes;
         for (std::size_t i = 0; i < count; ++i) {
@@ -102,7 +155,7 @@ public:
                 [&](Index c) {
                     Cell& cell = cells_[same_parity[c]];
                     for (const std::uint32_t i : cell.waiting)
-                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, refining, features[i]);
+                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, feature_of(i));
                     cell.waiting.clear();
                 },
                 16);
@@ -112,7 +165,7 @@ public:
     float gap(const SurfacePoint& x) {
         float closest = 1.0f;
         const std::int32_t id = cell_of(x.position);
-        for_each_near(cells_[id], x, [&](const Dart&, float d) {
+        for_each_near(cells_[id], x, [&](const Cell&, std::size_t, float d) {
             closest = std::min(closest, d / options_.spacing);
             return true;
         });
@@ -132,73 +185,106 @@ public:
         return static_cast<float>(rays) / inverse_sum < options_.spacing / 6.0f;
     }
 
+    struct Dart {
+        std::size_t candidate;
+        const Openness* openness;
+    };
     std::vector<Dart> darts() const {
         std::vector<Dart> all;
-        for (const Cell& cell : cells_) all.insert(all.end(), cell.darts.begin(), cell.darts.end());
+        for (const Cell& cell : cells_)
+            for (std::size_t k = 0; k < cell.darts.size(); ++k)
+                all.push_back({cell.candidate[k], &cell.openness[k]});
         std::sort(all.begin(), all.end(),
                   [](const Dart& a, const Dart& b) { return a.candidate < b.candidate; });
         return all;
     }
 
 private:
-    /// Calls visit(dart, D) for the darts with D < R until it returns false.
+    struct Near {
+        const Openness* openness;
+        float distance;
+    };
+
+    /// Calls visit(cell, number in it, D) for the darts with D < R until it returns false.
     template <class Visit>
     void for_each_near(const Cell& cell, const SurfacePoint& x, const Visit& visit) const {
-        constexpr std::size_t itself = 13; // most likely to hold a conflict
-        for (std::size_t k = 0; k < cell.neighbour.size(); ++k) {
-            const std::int32_t id = cell.neighbour[k == 0 ? itself : k <= itself ? k - 1 : k];
+        const float spacing2 = options_.spacing * options_.spacing;
+        const Vec3 in_cells = x.position / options_.spacing;
+        const Vec3 inside = in_cells - in_cells.array().floor().matrix();
+        const int eighth = (inside.x() >= 0.5f) | (inside.y() >= 0.5f) << 1 | (inside.z() >= 0.5f) << 2;
+        // Squared distances to the cells before, at and after one's own along each axis, in units of R.
+        std::array<std::array<float, 3>, 3> to_cell;
+        for (int a = 0; a < 3; ++a)
+            to_cell[a] = {inside[a] * inside[a], 0.0f, (1.0f - inside[a]) * (1.0f - inside[a])};
+        for (const int k : closest_first_[eighth]) {
+            const std::int32_t id = cell.neighbour[k];
             if (id < 0) continue;
-            for (const Dart& dart : cells_[id].darts) {
-                const Vec3 offset = x.position - dart.at.position;
+            constexpr float out_of_reach = 1.01f; // of R^2; the rest is rounding
+            if (to_cell[0][k % 3] + to_cell[1][k / 3 % 3] + to_cell[2][k / 9] > out_of_reach) continue;
+            const Cell& other = cells_[id];
+            for (std::size_t j = 0; j < other.darts.size(); ++j) {
+                const SurfacePoint& dart = other.darts[j];
+                const Vec3 offset = x.position - dart.position;
                 const float distance2 = offset.squaredNorm();
-                if (distance2 >= options_.spacing * options_.spacing) continue;
-                const float cosine = x.normal.dot(dart.at.normal);
+                if (distance2 >= spacing2) continue;
+                const float cosine = x.normal.dot(dart.normal);
                 if (cosine <= 0.0f) continue;
-                const float h = std::min(std::abs(offset.dot(x.normal)), std::abs(offset.dot(dart.at.normal)));
+                const float h = std::min(std::abs(offset.dot(x.normal)), std::abs(offset.dot(dart.normal)));
                 const float d = std::sqrt(distance2 + 8.0f * h * h)
                                 / cosine_power(cosine, options_.placement_power);
-                if (d < options_.spacing && !visit(dart, d)) return;
+                if (d < options_.spacing && !visit(other, j, d)) return;
             }
         }
     }
 
-    /// Whether x, in this cell, conflicts with no dart that is there. Sets the feature where it decides.
-    bool fits(const Cell& cell, const SurfacePoint& x, bool refining,
-              std::optional<Openness>& feature) const {
-        const float s = options_.openness_density;
+    /// Whether x, in this cell, conflicts with no dart that is there. `feature`: null unless refining; is
+    /// set where it decides.
+    bool fits(const Cell& cell, const SurfacePoint& x, std::optional<Openness>* feature) const {
         bool conflict = false;
-        if (!refining) {
-            for_each_near(cell, x, [&](const Dart&, float) {
+        if (!feature) {
+            for_each_near(cell, x, [&](const Cell&, std::size_t, float) {
                 conflict = true;
                 return false;
             });
             return !conflict;
         }
-        struct Near {
-            const Dart* dart;
-            float distance;
-        };
         std::array<Near, 128> near;
-        int count = 0;
-        for_each_near(cell, x, [&](const Dart& dart, float d) {
-            conflict = d < options_.spacing / 32.0f || count == static_cast<int>(near.size());
-            if (!conflict) near[count++] = {&dart, d};
-            return !conflict;
+        std::size_t count = 0, closest = 0;
+        for_each_near(cell, x, [&](const Cell& other, std::size_t j, float d) {
+            conflict = d < options_.spacing / 32.0f || count == near.size();
+            if (conflict) return false;
+            near[count] = {&other.openness[j], d};
+            if (d < near[closest].distance) closest = count;
+            ++count;
+            return true;
         });
         if (conflict) return false;
-        if (!feature) feature = probe_(x);
-        return std::none_of(near.begin(), near.begin() + count, [&](const Near& n) {
-            const float difference2 = openness_difference2(*feature, n.dart->openness);
-            return n.distance * std::exp(difference2 / (2.0f * s * s)) < options_.spacing;
+        std::swap(near[0], near[closest]);
+        const std::span<const Near> found(near.data(), count);
+        if (!*feature) *feature = probe_(x);
+        return std::none_of(found.begin(), found.end(), [&](const Near& n) {
+            return openness_difference2(**feature, *n.openness) < most_difference2(n.distance);
         });
     }
 
-    bool try_dart(Cell& cell, const SurfacePoint& x, std::size_t candidate, bool refining,
-                  std::optional<Openness>& feature) const {
-        if (!fits(cell, x, refining, feature)) return false;
-        if (!refining && options_.skip_narrow && narrow(x)) return false;
-        if (!feature) feature = options_.openness_density > 0.0f ? probe_(x) : Openness::Zero();
-        cell.darts.push_back({x, candidate, *feature});
+    /// A dart at this D < R is in conflict with what differs from it by less: D exp(|dF|^2 / (2 s^2)) < R.
+    float most_difference2(float distance) const {
+        const float s = options_.openness_density;
+        return 2.0f * s * s * std::log(options_.spacing / distance);
+    }
+
+    bool try_dart(Cell& cell, const SurfacePoint& x, std::size_t candidate,
+                  std::optional<Openness>* feature) const {
+        if (!fits(cell, x, feature)) return false;
+        if (!feature && options_.skip_narrow && narrow(x)) return false;
+        Openness openness = Openness::Zero();
+        if (feature && *feature)
+            openness = **feature;
+        else if (options_.openness_density > 0.0f)
+            openness = probe_(x);
+        cell.darts.push_back(x);
+        cell.openness.push_back(openness);
+        cell.candidate.push_back(candidate);
         return true;
     }
 
@@ -229,6 +315,7 @@ private:
     OpennessProbe probe_;
     std::vector<Cell> cells_;
     CellIndex index_;
+    const std::array<CellOrder, 8> closest_first_ = closest_first();
 };
 
 } // namespace
@@ -264,9 +351,9 @@ PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& opti
         if (gap > disk.largest_gap && !(options.skip_narrow && gap >= 1.0f && board.narrow(source[i].at)))
             disk.largest_gap = gap;
     }
-    for (const Dart& dart : board.darts()) {
+    for (const auto& dart : board.darts()) {
         disk.points.push_back(source[dart.candidate]);
-        if (options.openness_density > 0.0f) disk.openness.push_back(dart.openness);
+        if (options.openness_density > 0.0f) disk.openness.push_back(*dart.openness);
     }
     disk.candidates_tried = next - options.first_candidate;
     return disk;

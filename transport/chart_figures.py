@@ -23,7 +23,7 @@ LOOKS = {
     "path": ("#000000", "x", "path tracer, one picture"),
 }
 PARAMETERS = {
-    "rays": "gather rays of a finest point",
+    "rays": "gather rays of a receiver",
     "receiver_levels": "levels of receivers",
     "sender_levels": "levels of senders",
     "threshold": "threshold of links / the usual",

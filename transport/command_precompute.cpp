@@ -430,8 +430,8 @@ void add_precompute_command(CLI::App& app) {
     sub->add_option("--sender-levels", command->options.sender_levels,
                     "Levels of senders, spaced alike (default 5; of --operator paper 3)");
     sub->add_option("--rays", command->options.links.rays,
-                    "Gather rays of each finest point, made a power of two (default 512); more on "
-                    "coarser levels")
+                    "Gather rays of a receiver, made a power of two (default 512): more on coarser levels, on "
+                    "the finest no more than its thresholds need")
         ->check(CLI::Range(1, 32768));
     sub->add_option("--bounces", command->options.bounces,
                     "Bounces of indirect light (default 0: all; of --operator paper 4)")

@@ -36,7 +36,8 @@ struct MovingLightStatistics {
 /// small. A column of a level's links T_j waits while |change of c_j| |T_j| < tau sqrt(links of T_j), tau = 0.7
 /// tolerance |T c| / sqrt(all links), so that all that wait together change the field's root mean square
 /// by less than 0.7 `tolerance` of it. The light has settled when all changes together are below the
-/// tolerance, or would be in the next round by what rounds have passed on to the next so far. The display level's links are few, and all multiplied when a pose ends.
+/// tolerance, or would be in the next round by what rounds have passed on to the next so far. The display
+/// level's links are few, and all multiplied when a pose ends.
 class MovingLight {
 public:
     struct Options {
@@ -49,7 +50,8 @@ public:
 
     /// Indirect vector irradiance at all points under the light, until the next call. The same poses in
     /// the same order give the same bits at any number of threads. Of operators without further
-    /// columns (the paper's, or with a given number of bounces, or whose senders are displayed) it is LightTransport::indirect.
+    /// columns (the paper's, or with a given number of bounces, or whose senders are displayed) it is
+    /// LightTransport::indirect.
     const VectorIrradiance& follow(const Spotlight& light, MovingLightStatistics* statistics = nullptr);
 
 private:
