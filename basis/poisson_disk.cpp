@@ -4,8 +4,6 @@
 #include "core/parallel.h"
 #include "core/sampling.h"
 
-#include <immintrin.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -46,10 +44,6 @@ std::array<CellOrder, 8> closest_first() {
 
 using CellKey = std::array<std::int32_t, 3>;
 
-inline void prefetch_line(const void* address) {
-    _mm_prefetch(static_cast<const char*>(address), _MM_HINT_T0);
-}
-
 /// From the place of a cell to its number: open addressing, one cache line a look.
 class CellIndex {
 public:
@@ -62,7 +56,7 @@ public:
                 return slot.id;
         }
     }
-    void prefetch(const CellKey& key) const { prefetch_line(&slots_[hash(key) & (slots_.size() - 1)]); }
+    void prefetch(const CellKey& key) const { __builtin_prefetch(&slots_[hash(key) & (slots_.size() - 1)]); }
     /// The key must be new.
     void insert(const CellKey& key, std::int32_t id) {
         if (2 * ++used_ > slots_.size()) {
@@ -126,14 +120,14 @@ public:
             const auto candidate = [&](Index k) { return begin + (order[k] & 0xffffffff); };
             std::array<CellKey, at_once> key;
             std::array<std::int32_t, at_once> cell;
-            for (Index k = first; k < last; ++k) prefetch_line(&source[candidate(k)].at);
+            for (Index k = first; k < last; ++k) __builtin_prefetch(&source[candidate(k)].at);
             for (Index k = first; k < last; ++k) {
                 key[k - first] = key_of(source[candidate(k)].at.position);
                 index_.prefetch(key[k - first]);
             }
             for (Index k = first; k < last; ++k) {
                 cell[k - first] = index_.find(key[k - first]);
-                if (cell[k - first] >= 0) prefetch_line(&cells_[cell[k - first]]);
+                if (cell[k - first] >= 0) __builtin_prefetch(&cells_[cell[k - first]]);
             }
             for (Index k = first; k < last; ++k) {
                 const std::size_t i = candidate(k) - begin;
