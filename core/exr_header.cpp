@@ -125,6 +125,7 @@ bool read_attribute(const std::string& path, Bytes& header, Part& part) {
     if (fixed != fixed_types.end() && fixed->bytes != bytes.size()) value.fail();
     if (type == "preview") check_preview(value);
     if (type == "stringvector") check_strings(value);
+    if (type == "floatvector" && bytes.size() % sizeof(float) != 0) value.fail(); // the rest would be left unread
     if (type == "chlist") part.read_channels(value);
     if (name == "dataWindow" && type == "box2i") part.read_window(value);
     if (name == "compression" && type == "compression") part.compression = std::uint8_t(bytes[0]);

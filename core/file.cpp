@@ -52,7 +52,7 @@ std::filesystem::path folder_of(const std::string& path) {
     return folder.empty() ? "." : folder;
 }
 
-constexpr const char* unfinished = ".part-";
+constexpr const char* unfinished_mark = ".part-";
 
 /// A new file beside its target, which goes away unless it is renamed. It is locked while it is
 /// written: so another process can tell it from one that was left behind.
@@ -63,7 +63,7 @@ public:
         do {
             {
                 const auto hold = hold_off_early_end();
-                path_ = target + unfinished + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+                path_ = target + unfinished_mark + std::to_string(::getpid()) + "-" + std::to_string(counter++);
                 file_ = Descriptor(path_, O_WRONLY | O_CREAT | O_EXCL);
                 exists_ = static_cast<bool>(file_);
             }
@@ -105,7 +105,7 @@ private:
 
 /// Removes what processes that were killed have left of a target.
 void remove_left_behind(const std::string& target) {
-    const std::string start = std::filesystem::path(target).filename().string() + unfinished;
+    const std::string start = std::filesystem::path(target).filename().string() + unfinished_mark;
     std::error_code failure;
     for (const auto& entry : std::filesystem::directory_iterator(folder_of(target), failure)) {
         const std::string name = entry.path().filename().string();

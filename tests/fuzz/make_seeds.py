@@ -142,6 +142,9 @@ def make_exr():
         ("preview", "preview", struct.pack("<II", 20000, 20000) + bytes(8))]))
     write("exr", "claims_strings", exr(2, 2, 0, more=[
         ("multiView", "stringvector", struct.pack("<I", 2000000000) + b"left")]))
+    # Two bytes more than a float: left unread, they begin the next attribute, which then has gigabytes.
+    write("exr", "claims_after_floats", exr(2, 2, 0, more=[
+        ("list", "floatvector", bytes(4) + b"b\0"), ("own", "unknown", bytes(5))]))
     write("exr", "claims_attribute", exr(2, 2, 0).replace(b"seed\0string\0\1\0\0\0", b"seed\0string\0\1\0\0\x70"))
     write("exr", "claims_gigabytes", exr(4, 4, 3).replace(struct.pack("<ii", 3, 3), struct.pack("<ii", 60000, 60000)))
     write("exr", "claims_tiles", exr(4, 4, 0, tiles=(4, 4)).replace(

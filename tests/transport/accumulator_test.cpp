@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <utility>
+#include <cstdint>
 #include <vector>
 
 namespace afterglow {
@@ -20,20 +20,22 @@ TEST(Accumulator, VisitsWhatWasUsedInOrderAndForgetsIt) {
             sum.at(i) += value;
             dense[i] += value;
         }
-        for (const auto& [begin, end] :
-             {std::pair(0u, 1000u), {63u, 65u}, {64u, 128u}, {100u, 771u}}) {
+        struct Range {
+            std::uint32_t begin, end;
+        };
+        for (const Range range : {Range{0, 1000}, {63, 65}, {64, 128}, {100, 771}}) {
             std::uint32_t last = 0;
             bool first = true;
             double seen = 0.0, expected = 0.0;
-            sum.for_each(begin, end, [&](std::uint32_t i, float value) {
+            sum.for_each(range.begin, range.end, [&](std::uint32_t i, float value) {
                 EXPECT_TRUE(first || i > last);
                 first = false;
-                EXPECT_TRUE(i >= begin && i < end);
+                EXPECT_TRUE(i >= range.begin && i < range.end);
                 EXPECT_EQ(value, dense[i]);
                 last = i;
                 seen += value;
             });
-            for (std::uint32_t i = begin; i < end; ++i)
+            for (std::uint32_t i = range.begin; i < range.end; ++i)
                 expected += dense[i];
             EXPECT_NEAR(seen, expected, 1e-5);
         }

@@ -376,8 +376,9 @@ TEST(PathTracer, ANormalMapShowsNoLightFromBelowTheSurface) {
     Camera camera{.position = Vec3(0, 3, 0), .target = Vec3::Zero(), .up = Vec3::UnitX(), .vertical_fov = 5.0f, .width = 8, .height = 8};
     camera.check();
     for (const PathStrategy strategy : {PathStrategy::plain, PathStrategy::connected})
-        for (const auto& [layer, light] : {std::pair(Layer::indirect, hard_spot(beside_wall, -Vec3::UnitX(), 40.0f)),
-                                           std::pair(Layer::direct, hard_spot(beside_wall, -beside_wall, 40.0f))}) {
+        for (const Layer layer : {Layer::indirect, Layer::direct}) {
+            const Vec3 direction = layer == Layer::indirect ? Vec3(-Vec3::UnitX()) : Vec3(-beside_wall);
+            const Spotlight light = hard_spot(beside_wall, direction, 40.0f);
             const auto brightest = [&](const Scene& scene) {
                 const Surface surface(scene);
                 const Image image = render_reference(surface, light, camera, layer, {.samples = 256, .seed = 2, .strategy = strategy}).image;

@@ -69,7 +69,7 @@ TEST(SenderRows, AreTheBasisAtTheCentresOfTheirPatches) {
     SenderRows rows(example.surface, example.basis, 3, 0.25f);
     const std::vector<Hit> hits = hits_on_fronts(example.scene, 300, 2);
     rows.require(numbers_of(rows, hits));
-    std::size_t empty = 0, from_coarser = 0;
+    std::size_t empty = 0;
     for (int level = 0; level < 3; ++level) {
         const PatchGrid grid(example.scene, 0.25f * example.points.spacing[level]);
         for (const Hit& hit : hits) {
@@ -86,10 +86,8 @@ TEST(SenderRows, AreTheBasisAtTheCentresOfTheirPatches) {
             if (row.empty()) continue;
             ASSERT_NEAR(sum, 1.0f, 1e-5f);
             std::vector<BasisEntry> expected;
-            for (int l = level; l >= 0 && expected.empty(); --l) {
+            for (int l = level; l >= 0 && expected.empty(); --l)
                 example.basis.evaluate(l, x, expected);
-                from_coarser += l < level && !expected.empty();
-            }
             if (expected.empty()) example.basis.evaluate_or_nearest(level, x, expected);
             if (level == 2)
                 weigh_by_reflectance(example.points, example.surface.reflectance(center), expected);
@@ -152,7 +150,9 @@ TEST(SenderRows, KeepReflectancesApartOnTheFinestLevel) {
 TEST(SenderRows, KeepTheSidesOfAWallApart) {
     // A wall stands on one ground: a sheet through its patches, or as thick as a third of one so that
     // some have their centre in it.
-    for (const auto& [left, right] : {std::pair(0.011f, 0.011f), std::pair(0.0f, 0.02f)}) {
+    for (const float thickness : {0.0f, 0.02f}) {
+        const float left = thickness == 0.0f ? 0.011f : 0.0f;
+        const float right = left + thickness;
         Scene scene = make_ground(1.0f);
         for (const float x : {left, right}) {
             const auto first = static_cast<std::uint32_t>(scene.positions.size());
