@@ -236,7 +236,8 @@ LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, 
 /// Of a display receiver, see LinkOptions; so many that a link on its threshold is one ray and a half, which
 /// add 2 / N each on average.
 int display_rays(const LinkOptions& options, const PointHierarchy& points) {
-    const double suffice = 1.5 * 2.0 / (display_threshold * link_threshold(options, points));
+    constexpr double least = 32.0; // however few links are kept
+    const double suffice = std::max(least, 1.5 * 2.0 / (display_threshold * link_threshold(options, points)));
     const double of_usual = std::exp2(std::ceil(std::log2(suffice) - 0.01));
     const double share = std::min(1.0, of_usual / std::min(options.rays, LinkOptions().rays));
     return static_cast<int>(share * options.rays);

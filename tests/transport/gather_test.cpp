@@ -99,7 +99,7 @@ bool stratified(const std::vector<Eigen::Vector2d>& points) {
 }
 
 TEST(GatherDirections, StratifyEachReceiverAndItsNeighbours) {
-    for (const int rays : {16, 64, 256}) {
+    for (const int rays : {8, 16, 32, 64, 256}) {
         const GatherDirections directions(rays, 5);
         Eigen::Matrix3Xf d;
         std::vector<Eigen::Vector2d> pair, four;
@@ -120,6 +120,19 @@ TEST(GatherDirections, StratifyEachReceiverAndItsNeighbours) {
                 four.clear();
             }
         }
+    }
+}
+
+/// Eight in a row share a cell of the square, an eighth of 1024 cells' sides each way.
+TEST(GatherDirections, HaveNeighboursOfSimilarDirection) {
+    const GatherDirections directions(1024, 3);
+    Eigen::Matrix3Xf d;
+    directions.deal(7, d);
+    for (Index k = 0; k < d.cols(); k += 8) {
+        Eigen::AlignedBox2d box;
+        for (Index n = k; n < k + 8; ++n) box.extend(unit_square(d.col(n)));
+        EXPECT_LT(box.sizes().x(), 1.0 / 8 + 1e-4) << k;
+        EXPECT_LT(box.sizes().y(), 1.0 / 16 + 1e-4) << k;
     }
 }
 
