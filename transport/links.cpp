@@ -233,11 +233,11 @@ LevelThresholds level_thresholds(float threshold, const PointHierarchy& points, 
     return thresholds;
 }
 
-/// Of a display receiver, see LinkOptions; so many that a link on its threshold is one ray and a half, which
-/// add 2 / N each on average.
+/// Of a display receiver, see LinkOptions; so many that a link on its threshold is three rays, which add
+/// 2 / N each on average; of fewer, walls are speckled.
 int display_rays(const LinkOptions& options, const PointHierarchy& points) {
     constexpr double least = 32.0; // however few links are kept
-    const double suffice = std::max(least, 1.5 * 2.0 / (display_threshold * link_threshold(options, points)));
+    const double suffice = std::max(least, 3.0 * 2.0 / (display_threshold * link_threshold(options, points)));
     const double of_usual = std::exp2(std::ceil(std::log2(suffice) - 0.01));
     const double share = std::min(1.0, of_usual / std::min(options.rays, LinkOptions().rays));
     return static_cast<int>(share * options.rays);
