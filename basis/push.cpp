@@ -11,6 +11,19 @@ namespace {
 
 constexpr int most_channels = 12;
 
+/// sum_k weight_k values_k over a row.
+inline std::array<float, most_channels> weighted_sum(const SparseRows<float>& rows, Index i, int channels,
+                                                     std::span<const float> values) {
+    std::array<float, most_channels> sum{};
+    const auto index = rows.indices(i);
+    const auto weight = rows.values(i);
+    for (std::size_t e = 0; e < index.size(); ++e) {
+        const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
+        for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
+    }
+    return sum;
+}
+
 /// values_i += sign * sum_k weight_ik values_k for the points of one level. `fixed`: the number of
 /// channels where it is known when this is compiled, which makes it twice as fast; else 0.
 template <int fixed>
@@ -21,13 +34,7 @@ void add_weighted(const SparseRows<float>& rows, Index begin, Index end, int any
         end - begin,
         [&](Index k) {
             const Index i = begin + k;
-            std::array<float, most_channels> sum{};
-            const auto index = rows.indices(i);
-            const auto weight = rows.values(i);
-            for (std::size_t e = 0; e < index.size(); ++e) {
-                const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
-                for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
-            }
+            const auto sum = weighted_sum(rows, i, channels, values);
             float* to = &values[static_cast<std::size_t>(i) * channels];
             for (int c = 0; c < channels; ++c) to[c] += sign * sum[c];
         },
@@ -61,14 +68,8 @@ void average(const SparseRows<float>& rows, Index begin, Index end, int any_chan
         end - begin,
         [&](Index k) {
             const Index i = begin + k;
-            const auto index = rows.indices(i);
-            const auto weight = rows.values(i);
-            if (index.empty()) return;
-            std::array<float, most_channels> sum{};
-            for (std::size_t e = 0; e < index.size(); ++e) {
-                const float* from = &values[static_cast<std::size_t>(index[e]) * channels];
-                for (int c = 0; c < channels; ++c) sum[c] += weight[e] * from[c];
-            }
+            if (rows.indices(i).empty()) return;
+            const auto sum = weighted_sum(rows, i, channels, values);
             std::copy_n(sum.begin(), channels, &values[static_cast<std::size_t>(i) * channels]);
         },
         256);

@@ -254,6 +254,13 @@ Scene closed_shell(int n, bool round) {
     return scene;
 }
 
+/// At a place along a triangle's first edge: 0 is its corner.
+Ray ray_to_an_edge(const Scene& scene, std::size_t triangle, const Vec3& from, float along) {
+    const Triangle& t = scene.triangles[triangle];
+    const Vec3 at = (1.0f - along) * scene.positions[t[0]] + along * scene.positions[t[1]];
+    return {from, (at - from).normalized()};
+}
+
 TEST(Surface, LetsNoRaySlipThroughBetweenTwoTriangles) {
     for (const bool round : {false, true}) {
         const Scene scene = closed_shell(60, round);
@@ -263,11 +270,10 @@ TEST(Surface, LetsNoRaySlipThroughBetweenTwoTriangles) {
         parallel_for(200'000, [&](Index i) {
             Rng rng(11, static_cast<std::uint64_t>(i));
             const Vec3 from = Vec3(5.3f, 1.1f, -7.7f) + 1.9f * random_point(rng);
-            const Triangle& t = scene.triangles[rng.next() % scene.triangles.size()];
-            const float along = i % 4 == 0 ? 0.0f : rng.uniform();
-            const Vec3 at = (1.0f - along) * scene.positions[t[0]] + along * scene.positions[t[1]];
-            escaped += !surface.closest_hit({from, (at - from).normalized()});
-            escaped += !surface.occluded({from, (at - from).normalized()});
+            const std::size_t triangle = rng.next() % scene.triangles.size();
+            const Ray ray = ray_to_an_edge(scene, triangle, from, i % 4 == 0 ? 0.0f : rng.uniform());
+            escaped += !surface.closest_hit(ray);
+            escaped += !surface.occluded(ray);
         });
         EXPECT_EQ(escaped, 0);
     }
@@ -284,12 +290,8 @@ TEST(Surface, LetsNoRayOfAPacketSlipThroughBetweenTwoTriangles) {
             std::array<Ray, 8> rays;
             std::array<Hit, 8> hits;
             const std::size_t first = rng.next() % (scene.triangles.size() - rays.size());
-            for (std::size_t k = 0; k < rays.size(); ++k) { // triangles side by side, as in the gather
-                const Triangle& t = scene.triangles[first + k];
-                const float along = i % 4 == 0 ? 0.0f : rng.uniform();
-                const Vec3 at = (1.0f - along) * scene.positions[t[0]] + along * scene.positions[t[1]];
-                rays[k] = {from, (at - from).normalized()};
-            }
+            for (std::size_t k = 0; k < rays.size(); ++k) // triangles side by side, as in the gather
+                rays[k] = ray_to_an_edge(scene, first + k, from, i % 4 == 0 ? 0.0f : rng.uniform());
             surface.closest_hits(rays, hits, coherent);
             for (const Hit& hit : hits) escaped += !hit;
         });
