@@ -78,6 +78,7 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
             = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
         disk_options.openness_density = density;
+        disk_options.candidates_per_point = by_openness ? 128 : options.candidates_per_point;
         const PoissonDisk disk = poisson_disk(source, disk_options);
 
         std::vector<Openness> placed;
@@ -104,8 +105,8 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
         hierarchy.level_begin.push_back(hierarchy.level_begin.back()
                                         + static_cast<std::uint32_t>(levels[l].size()));
         if (statistics)
-            statistics->level.push_back({static_cast<std::uint32_t>(levels[l].size()),
-                                         disk.candidates_tried, disk.largest_gap});
+            statistics->level.push_back(
+                {static_cast<std::uint32_t>(levels[l].size()), disk.candidates_tried});
         // A level takes about as long as all before it.
         if (options.progress) options.progress(std::ldexp(1.0, l + 1 - level_count));
     }

@@ -58,6 +58,7 @@ struct HierarchyOptions {
     std::optional<DisplayLevel> display = {};
     BasisShape shape = {};
     bool skip_narrow = true; // on every level but an openness level
+    int candidates_per_point = 48; // of PoissonDiskOptions, likewise; finer levels fill what holes they leave
     std::uint64_t seed = 1;
     std::function<void(double)> progress = {}; // is told the share of the work that is done
 };
@@ -65,7 +66,6 @@ struct HierarchyOptions {
 struct LevelStatistics {
     std::uint32_t points = 0;
     std::uint64_t candidates_tried = 0;
-    float largest_gap = 0.0f; // in units of R, see PoissonDisk
 };
 
 struct HierarchyStatistics {

@@ -15,6 +15,8 @@
 namespace afterglow {
 namespace {
 
+constexpr std::size_t candidates_per_feature = 48; // a point at most, while features add points
+
 struct Cell {
     std::array<std::int32_t, 27> neighbour; // itself included; -1 where nothing is
     int parity;                             // cells of equal parity never touch
@@ -155,30 +157,6 @@ public:
                 16);
     }
 
-    /// min(D, R) to the closest dart, in units of R.
-    float gap(const SurfacePoint& x) {
-        float closest = 1.0f;
-        const std::int32_t id = cell_of(x.position);
-        for_each_near(cells_[id], x, [&](const Cell&, std::size_t, float d) {
-            closest = std::min(closest, d / options_.spacing);
-            return true;
-        });
-        return closest;
-    }
-
-    bool narrow(const SurfacePoint& x) const {
-        constexpr int rays = 16;
-        const float reach = 3.0f * options_.spacing;
-        const Frame frame(x.normal);
-        float inverse_sum = 0.0f;
-        for (int k = 0; k < rays; ++k) {
-            const Vec3 direction = frame.to_world(sample_cosine(scrambled_sobol2(k, 13)));
-            const Hit hit = surface_.closest_hit({surface_.lifted(x), direction, reach});
-            inverse_sum += 1.0f / std::max(hit ? hit.distance : reach, 1e-6f * reach);
-        }
-        return static_cast<float>(rays) / inverse_sum < options_.spacing / 6.0f;
-    }
-
     struct Dart {
         std::size_t candidate;
         const Openness* openness;
@@ -229,6 +207,19 @@ private:
                 if (d < options_.spacing && !visit(other, j, d)) return;
             }
         }
+    }
+
+    bool narrow(const SurfacePoint& x) const {
+        constexpr int rays = 16;
+        const float reach = 3.0f * options_.spacing;
+        const Frame frame(x.normal);
+        float inverse_sum = 0.0f;
+        for (int k = 0; k < rays; ++k) {
+            const Vec3 direction = frame.to_world(sample_cosine(scrambled_sobol2(k, 13)));
+            const Hit hit = surface_.closest_hit({surface_.lifted(x), direction, reach});
+            inverse_sum += 1.0f / std::max(hit ? hit.distance : reach, 1e-6f * reach);
+        }
+        return static_cast<float>(rays) / inverse_sum < options_.spacing / 6.0f;
     }
 
     /// Whether x, in this cell, conflicts with no dart that is there. `feature`: null unless refining; is
@@ -316,35 +307,26 @@ private:
 
 PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options) {
     DartBoard board(source.surface(), options);
-    bool refining = options.openness_density > 0.0f;
-    std::size_t next = options.first_candidate, accepted_total = 0;
-    int failures = 0;
+    std::size_t next = options.first_candidate, points = 0;
     std::vector<char> accepted;
     // Rounds stay small against what is there already, so that the order of cells leaves no pattern.
-    while (failures < options.failures_to_end) {
-        const std::size_t round = std::max<std::size_t>(2048, accepted_total / 2);
+    // Past the first rate, a dart with a feature, which costs rays, changes little: what remains is to
+    // leave no hole.
+    bool refining = options.openness_density > 0.0f;
+    for (bool done = false; !done;) {
+        const std::size_t round = std::max<std::size_t>(2048, points / 2);
         source.ensure(next + round);
         board.throw_darts(source, next, next + round, refining, accepted);
-        const auto hits = static_cast<std::size_t>(std::count(accepted.begin(), accepted.end(), 1));
-        for (const char a : accepted) failures = a ? 0 : failures + 1;
-        accepted_total += hits;
+        const auto fresh = static_cast<std::size_t>(std::count(accepted.begin(), accepted.end(), 1));
         next += round;
-        // Features cost rays, and narrow contacts are met seldom: past this rate another dart changes
-        // little, and what remains is to leave no hole of size R.
-        if (refining && hits * 48 < round) {
-            refining = false;
-            failures = 0;
-        }
+        points += fresh;
+        if (refining)
+            refining = fresh * candidates_per_feature >= round;
+        else
+            done = fresh * options.candidates_per_point < round;
     }
 
     PoissonDisk disk;
-    const std::size_t fresh = 4096;
-    source.ensure(next + fresh);
-    for (std::size_t i = next; i < next + fresh; ++i) {
-        const float gap = board.gap(source[i].at);
-        if (gap > disk.largest_gap && !(options.skip_narrow && gap >= 1.0f && board.narrow(source[i].at)))
-            disk.largest_gap = gap;
-    }
     for (const auto& dart : board.darts()) {
         disk.points.push_back(source[dart.candidate]);
         if (options.openness_density > 0.0f) disk.openness.push_back(*dart.openness);

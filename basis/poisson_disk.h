@@ -20,20 +20,18 @@ struct PoissonDiskOptions {
     /// y conflicts with x if D < R/32, or if D exp(|dF|^2 / (2 s^2)) < R.
     float openness_density = 0.0f;
     std::size_t first_candidate = 0; // where in the source's sequence to begin
-    int failures_to_end = 2000;      // the set is maximal once so many candidates failed in a row
+    /// The set is done where a round of darts yields fewer points than one of so many candidates: holes
+    /// are then about 1 / candidates_per_point of the surface.
+    int candidates_per_point = 48;
 };
 
 struct PoissonDisk {
     std::vector<Candidate> points;
-    std::vector<Openness> openness;  // a point each where a density was asked, else empty
+    std::vector<Openness> openness; // a point each where a density was asked, else empty
     std::size_t candidates_tried = 0;
-    std::uint64_t rays = 0;          // of features and harmonic means
-    /// Of fresh candidates at the end, the largest D to the closest point, in units of R (1 where
-    /// there is none within R); narrow places left out on purpose do not count.
-    float largest_gap = 0.0f;
 };
 
-/// A maximal Poisson-disk set of the candidates by dart throwing, under
+/// A Poisson-disk set of the candidates, maximal but for candidates_per_point, by dart throwing under
 ///
 ///     D(x, y) = min(d_x(y), d_y(x)) / max(0, n_x . n_y)^power     [LZT08, eq. (11)].
 ///

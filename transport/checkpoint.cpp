@@ -26,7 +26,7 @@ Json counts_json(const PrecomputeReport& report) {
     Json viewpoints = Json::array(), levels = Json::array();
     for (const Vec3& v : report.viewpoints) viewpoints.push_back({v.x(), v.y(), v.z()});
     for (const LevelStatistics& level : report.hierarchy.level)
-        levels.push_back({level.points, level.candidates_tried, level.largest_gap});
+        levels.push_back({level.points, level.candidates_tried});
     return {{"viewpoints", viewpoints},
             {"mean_ray_length", report.mean_ray_length},
             {"levels", levels},
@@ -45,7 +45,7 @@ PrecomputeReport counts_of(const Json& json) {
     for (const Json& v : json.at("viewpoints"))
         report.viewpoints.emplace_back(real(v.at(0)), real(v.at(1)), real(v.at(2)));
     for (const Json& level : json.at("levels"))
-        report.hierarchy.level.push_back({level.at(0), level.at(1), real(level.at(2))});
+        report.hierarchy.level.push_back({level.at(0), level.at(1)});
     report.mean_ray_length = json.at("mean_ray_length");
     report.points_rays = json.at("points_rays");
     report.links.rays = json.at("link_rays");

@@ -122,7 +122,6 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
         const LevelStatistics& level = report.hierarchy.level[static_cast<std::size_t>(l)];
         levels.push_back({{"functions", level.points},
                           {"candidates", level.candidates_tried},
-                          {"largest_gap", level.largest_gap},
                           {"links", links.level[static_cast<std::size_t>(l)]}});
     }
     Json json = {{"viewpoints", viewpoints},

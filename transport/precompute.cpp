@@ -52,6 +52,7 @@ HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSo
     if (options.kind == OperatorKind::paper) {
         hierarchy.levels = options.receiver_levels;
         hierarchy.shape = BasisShape::paper();
+        hierarchy.candidates_per_point = 500; // about where 2000 in a row fail for the first time
     } else {
         hierarchy.levels = std::max(options.receiver_levels - 1, options.sender_levels);
         hierarchy.finest_density = options.sender_density;

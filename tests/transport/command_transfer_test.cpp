@@ -48,7 +48,7 @@ TEST_F(CommandTransfer, PrecomputeTellsOnStderrAndReportsAsJson) {
     EXPECT_NE(made.err.find("30 triangles"), std::string::npos) << made.err;
     EXPECT_EQ(made.err.find('\r'), std::string::npos) << "progress is for terminals";
     const std::string report = content_of(folder.path("r.json"));
-    for (const char* key : {"\"seconds\"", "\"gather\"", "\"write\"", "\"largest_gap\"",
+    for (const char* key : {"\"seconds\"", "\"gather\"", "\"write\"", "\"candidates\"",
                             "\"scene_hash\"", "\"options\"", "\"bytes\""})
         EXPECT_NE(report.find(key), std::string::npos) << key;
     EXPECT_EQ(content_of(folder.path("t")), content_of(file())) << "the same bytes again";
@@ -336,7 +336,7 @@ TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
     EXPECT_EQ(json.status, 0) << json.err;
     EXPECT_EQ(json.out.find('\n'), json.out.size() - 1);
     for (const char* key : {"\"levels\":[{", "\"functions\":", "\"links\":", "\"bytes\":{",
-                            "\"options\":{", "\"scene_hash\":", "\"largest_gap\":",
+                            "\"options\":{", "\"scene_hash\":", "\"candidates\":",
                             "\"verified\":{\"rel_rmse\":"})
         EXPECT_NE(json.out.find(key), std::string::npos) << key;
     EXPECT_NE(text.out.find("\nverified    "), std::string::npos) << text.out;

@@ -153,10 +153,11 @@ TEST(DirectLight, OfAFarLightIsSampledAtThePointsAndAroundThemAtAnEdge) {
 }
 
 TEST(DirectLight, AnEdgeThatPassesSwitchesNoSenderAtOnce) {
-    // A hard circle of light that walks in steps of a hundredth of a spacing.
-    const float step = finer_example().spacing() / 100.0f;
+    // A hard circle of light that walks in steps of a two-hundredth of a spacing: of eight places it passes
+    // no three at once.
+    const float step = finer_example().spacing() / 200.0f;
     Radiosity last;
-    for (int k = 0; k < 60; ++k) {
+    for (int k = 0; k < 120; ++k) {
         const Spotlight light = spot(Vec3(static_cast<float>(k) * step, 0.9f, 0.0f),
                                      -Vec3::UnitY(), 22.0f);
         const Radiosity now = finer_example().radiosity(light);

@@ -86,9 +86,9 @@ TEST(SenderRows, AreTheBasisAtTheCentresOfTheirPatches) {
             if (row.empty()) continue;
             ASSERT_NEAR(sum, 1.0f, 1e-5f);
             std::vector<BasisEntry> expected;
-            for (int l = level; l >= 0 && expected.empty(); --l)
+            example.basis.evaluate_or_nearest(level, x, expected);
+            for (int l = level - 1; l >= 0 && expected.empty(); --l)
                 example.basis.evaluate(l, x, expected);
-            if (expected.empty()) example.basis.evaluate_or_nearest(level, x, expected);
             if (level == 2)
                 weigh_by_reflectance(example.points, example.surface.reflectance(center), expected);
             const bool undecided =
