@@ -133,6 +133,7 @@ ChartPoint ChartBench::measure(const ChartSetting& setting) const {
     TuningReport tuning;
     TuningOptions search;
     search.target_error = setting.target.value_or(0.0);
+    search.most_seconds = setting.most_seconds;
     search.judge = [&](const TransferOperator& found, const PrecomputeReport& of, int time) {
         return fresh_verifier(surface_, of, options.seed, time).error_of(found);
     };

@@ -6,6 +6,7 @@
 #include "transport/verification.h"
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ struct ChartSetting {
     double value = 0.0;
     PrecomputeOptions options;
     std::optional<double> target = {}; // of precompute_to_target()
+    double most_seconds = std::numeric_limits<double>::infinity(); // of that search
     /// coarse_radius of the options is this share of the radius that is found by itself; 0: left to it.
     float radius_share = 0.0f;
     Index path_samples = 0; // above 0: paths a place instead of an operator

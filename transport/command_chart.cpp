@@ -16,6 +16,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -32,6 +33,7 @@ struct ChartCommand {
     std::string output;
     bool brief = false;
     std::vector<std::string> sweeps; // those that are measured; empty: all
+    double max_time = std::numeric_limits<double>::infinity(); // of a search for a spacing [s]
     RunOptions run;
 };
 
@@ -172,6 +174,7 @@ std::vector<ChartSetting> wanted_settings(const ChartCommand& command) {
         const bool tells_radius = std::exchange(first, false) && by_radius;
         return !is_wanted(s) && !tells_radius;
     });
+    for (ChartSetting& setting : settings) setting.most_seconds = command.max_time;
     return settings;
 }
 
@@ -225,6 +228,7 @@ void draw(const ChartCommand& command) {
 }
 
 void run(const ChartCommand& command) {
+    if (!(command.max_time > 0.0)) throw UsageError("--max-time must be positive");
     const ThreadLimit limit(command.run.threads);
     std::error_code failed;
     std::filesystem::create_directories(command.output, failed);
@@ -251,6 +255,8 @@ void add_chart_command(CLI::App& app) {
                     "rays, receiver_levels, sender_levels, threshold, bounces")
         ->delimiter(',')
         ->type_name("SWEEP,...");
+    add_number(*sub, "--max-time", command->max_time,
+               "Limit of each search for a spacing in seconds: the sweep target then has the best that was reached");
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);
     sub->callback([command] { run(*command); });

@@ -77,6 +77,14 @@ TEST(CommandChart, MeasuresSomeSweepsAlone) {
     EXPECT_TRUE(std::filesystem::exists(folder.path("p/error_time_builtin_cornell.png")));
     EXPECT_FALSE(std::filesystem::exists(folder.path("p/error_bytes_builtin_cornell.png")));
 
+    // A search that has no time has its first step.
+    const Outcome limited = run("chart builtin:cornell --brief -o '" + folder.path("t") + "' --max-time 0.1 --sweeps target=0.03");
+    ASSERT_EQ(limited.status, 0) << limited.err;
+    const nlohmann::json first = nlohmann::json::parse(content_of(folder.path("t/runs.json")))["runs"][0];
+    EXPECT_GT(first["rel_rmse"], 0.04);
+    EXPECT_EQ(first["coarse_radius"], points[0]["coarse_radius"]); // which is enough for 30 %
+
+    EXPECT_EQ(run(start + "target=0.3 --max-time 0").status, 2);
     EXPECT_EQ(run(start + "dance").status, 2);
     EXPECT_EQ(run(start + "target=0.31").status, 2);
     EXPECT_EQ(run(start + "target=much").status, 2);
