@@ -13,30 +13,37 @@ namespace {
 
 constexpr float only_splatted = 4.0f, only_sampled = 10.0f; // s / R
 constexpr std::uint32_t splatted_rays = 1 << 13;
+constexpr float rays_a_sender = 64.0f; // that count, where all is splatted; of all rays at least:
+constexpr float least_share = 1.0f / 32.0f;
 constexpr float golden_section = 0.38196601f; // of a turn, between places one after the other
 
 float radians(float degrees) {
     return degrees * static_cast<float>(EIGEN_PI / 180.0);
 }
 
-/// Where the splatted rays leave, in the unit square; along a Z-order curve, so that rays of one packet are alike.
-std::vector<Vec2> splatted_places() {
+struct SplattedPlace {
+    Vec2 u;      // in the unit square
+    float order; // in the sequence, from 0 to 1: the first ones are well spread by themselves
+};
+
+/// Where the splatted rays leave; along a Z-order curve, so that rays of one packet are alike.
+std::vector<SplattedPlace> splatted_places() {
     struct Place {
-        std::uint32_t order;
-        Vec2 u;
+        std::uint32_t code;
+        SplattedPlace place;
     };
     std::vector<Place> places(splatted_rays);
     for (std::uint32_t k = 0; k < splatted_rays; ++k) {
         const Vec2 u = scrambled_sobol2(k, 17);
-        std::uint32_t order = 0;
+        std::uint32_t code = 0;
         for (int bit = 0; bit < 12; ++bit)
             for (int axis = 0; axis < 2; ++axis)
-                order |= (static_cast<std::uint32_t>(u[axis] * 4096.0f) >> bit & 1u) << (2 * bit + axis);
-        places[k] = {order, u};
+                code |= (static_cast<std::uint32_t>(u[axis] * 4096.0f) >> bit & 1u) << (2 * bit + axis);
+        places[k] = {code, {u, static_cast<float>(k) / splatted_rays}};
     }
-    std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.order < b.order; });
-    std::vector<Vec2> sorted;
-    for (const Place& place : places) sorted.push_back(place.u);
+    std::stable_sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.code < b.code; });
+    std::vector<SplattedPlace> sorted;
+    for (const Place& place : places) sorted.push_back(place.place);
     return sorted;
 }
 
@@ -49,6 +56,14 @@ float relative_scale(const Spotlight& light) {
 float share_of_scale(float scale) {
     const float t = std::clamp((scale - only_splatted) / (only_sampled - only_splatted), 0.0f, 1.0f);
     return t * t * (3.0f - 2.0f * t);
+}
+
+/// Of the rays, the share that counts where they go so far: as many a sender, the fewer the less of the light
+/// is splatted.
+float counted_share(float scale) {
+    const float splatted = scale * (1.0f - share_of_scale(scale));
+    return std::clamp(rays_a_sender / splatted_rays * static_cast<float>(EIGEN_PI) * splatted * splatted,
+                      least_share, 1.0f);
 }
 
 } // namespace
@@ -219,7 +234,7 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
     const float solid_angle = 2.0f * static_cast<float>(EIGEN_PI) * height;
     const Frame frame(light.direction);
     const Falloff falloff_of(light);
-    static const std::vector<Vec2> places = splatted_places();
+    static const std::vector<SplattedPlace> places = splatted_places();
 
     struct Splat {
         std::vector<BasisEntry> row;
@@ -232,7 +247,7 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
         std::array<float, packet> falloff;
         std::array<Hit, packet> hits;
         for (Index k = first; k < last; ++k) {
-            const Vec3 local = sample_cone(places[static_cast<std::size_t>(k)], height);
+            const Vec3 local = sample_cone(places[static_cast<std::size_t>(k)].u, height);
             rays[k - first] = {light.position, frame.to_world(local), farthest};
             falloff[k - first] = falloff_of(local.z());
         }
@@ -240,8 +255,10 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
         surface_.closest_hits(std::span(rays).first(count), std::span(hits).first(count));
         for (Index k = first; k < last; ++k) {
             const Hit& hit = hits[k - first];
-            const float splatted =
-                hit ? falloff[k - first] * (1.0f - share_of_scale(scale * hit.distance)) : 0.0f;
+            if (!hit) continue;
+            const float counted = counted_share(scale * hit.distance);
+            if (places[static_cast<std::size_t>(k)].order >= counted) continue;
+            const float splatted = falloff[k - first] * (1.0f - share_of_scale(scale * hit.distance)) / counted;
             if (splatted == 0.0f) continue;
             Splat& splat = splats[static_cast<std::size_t>(first / packet)].emplace_back();
             sender_row(surface_, basis(), level_, hit, splat.row);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 namespace afterglow {
+
 LinkColumns::LinkColumns(const Links& links, Index senders, Index first_row, Index last_row)
     : receivers_(last_row - first_row), senders_(senders),
       begin_(static_cast<std::size_t>(blocks() * (senders + 1))),
@@ -38,10 +39,6 @@ LinkColumns::LinkColumns(const Links& links, Index senders, Index first_row, Ind
             entry_[next[sender]++] = entry;
         });
     }, 1);
-}
-
-void LinkColumns::add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {
-    parallel_for(blocks(), [&](Index block) { add_product(block, changes, to); }, 1);
 }
 
 void LinkColumns::add_product(Index block, std::span<const Change> changes, std::span<Eigen::Vector4f> to) const {

@@ -17,7 +17,6 @@ public:
 
     /// Copies the links of the rows [first, last), which are its receivers, from so many senders.
     LinkColumns(const Links& links, Index senders, Index first, Index last);
-    LinkColumns(const Links& links, Index senders) : LinkColumns(links, senders, 0, links.rows()) {}
 
     std::uint64_t links() const { return entry_.size(); }
     std::uint32_t links_of(Index sender) const { return count_[static_cast<std::size_t>(sender)]; }
@@ -26,10 +25,8 @@ public:
         std::uint32_t sender;
         Eigen::Vector4f coefficients; // R, G, B, 0
     };
-    /// to[3 i + a] += sum of link_ij[a] * change_j over the changes j, for all receivers i and axes a.
-    /// Changes must rise by sender. The same bits at any number of threads.
-    void add_product(std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
-    /// Of the receivers of one block alone; blocks may be added to at the same time.
+    /// to[3 i + a] += sum of link_ij[a] * change_j over the changes j, for the block's receivers i (counted
+    /// from the first of all) and axes a. Changes must rise by sender. Blocks may be added to at the same time.
     void add_product(Index block, std::span<const Change> changes, std::span<Eigen::Vector4f> to) const;
     Index blocks() const { return (receivers_ + block_size - 1) / block_size; }
     /// Square root of sum_i weight_i |link_ij|^2 of each sender; a weight a receiver.

@@ -40,7 +40,7 @@ MovingLight::MovingLight(const LightTransport& transport, const Options& options
     const PointHierarchy& points = transport.transfer().points;
     const std::size_t coarse = points.begin(points.levels() - 1);
     product_.resize(3 * coarse, Eigen::Vector4f::Zero());
-    coarse_.resize(3 * coarse, Eigen::Vector4f::Zero());
+    coarse_.resize(coarse);
     field_.resize(9 * static_cast<std::size_t>(points.size()));
 }
 
@@ -92,18 +92,17 @@ void MovingLight::unpack_display_links() {
     }, 4096);
 }
 
-/// A product, and what the level above predicts there: x, y, z.
-inline std::array<Eigen::Vector4f, 3> MovingLight::with_prediction(Index i, const Eigen::Vector4f& px,
-                                                                   const Eigen::Vector4f& py,
-                                                                   const Eigen::Vector4f& pz) const {
+/// A product, and what the level above predicts there.
+inline MovingLight::Padded MovingLight::with_prediction(Index i, const Eigen::Vector4f& px, const Eigen::Vector4f& py,
+                                                        const Eigen::Vector4f& pz) const {
     const SparseRows<float>& parents = transport_.transfer().push.parents;
     const std::uint64_t end = parents.begin[static_cast<std::size_t>(i + 1)];
     const std::uint32_t* const index = parents.index.data();
     const float* const weight = parents.value.data();
-    const Eigen::Vector4f* const coarse = coarse_.data();
+    const Padded* const coarse = coarse_.data();
     Eigen::Vector4f x = px, y = py, z = pz; // not in memory
     for (std::uint64_t e = parents.begin[static_cast<std::size_t>(i)]; e < end; ++e) {
-        const Eigen::Vector4f* const parent = coarse + 3 * std::size_t{index[e]};
+        const Padded& parent = coarse[index[e]];
         x += weight[e] * parent[0];
         y += weight[e] * parent[1];
         z += weight[e] * parent[2];
@@ -119,14 +118,14 @@ void MovingLight::push_levels(int levels, const Visit& visit) {
         const Index first = points.begin(levels_pushed_);
         parallel_for(points.end(levels_pushed_) - first, [&](Index k) {
             const Eigen::Vector4f* const product = &product_[static_cast<std::size_t>(3 * (first + k))];
-            const std::array<Eigen::Vector4f, 3> v = with_prediction(first + k, product[0], product[1], product[2]);
-            std::copy_n(v.begin(), 3, &coarse_[static_cast<std::size_t>(3 * (first + k))]);
-            visit(first + k, v.data());
+            const Padded v = with_prediction(first + k, product[0], product[1], product[2]);
+            coarse_[static_cast<std::size_t>(first + k)] = v;
+            visit(first + k, v);
         }, 512);
     }
 }
 
-void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
+void MovingLight::store(Index i, const Padded& value) {
     for (std::size_t a = 0; a < 3; ++a)
         std::copy_n(value[a].data(), 3, &field_[9 * static_cast<std::size_t>(i) + 3 * a]);
 }
@@ -135,7 +134,7 @@ void MovingLight::store(Index i, const std::array<Eigen::Vector4f, 3>& value) {
 void MovingLight::push_display() {
     const PointHierarchy& points = transport_.transfer().points;
     if (display_begin_.empty()) unpack_display_links();
-    push_levels(points.levels() - 1, [](Index, const auto&) {});
+    push_levels(points.levels() - 1, [](Index, const Padded&) {});
     const Index first = points.begin(points.levels() - 1), count = static_cast<Index>(points.size()) - first;
     constexpr Index grain = 1024;
     struct Chunk {
@@ -158,20 +157,15 @@ void MovingLight::push_display() {
                 y += link.y() * c;
                 z += link.z() * c;
             }
-            const std::array<Eigen::Vector4f, 3> v = with_prediction(i, x, y, z);
+            const Padded v = with_prediction(i, x, y, z);
             store(i, v);
-            const Vec3 n = points.normal.col(i);
-            const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
-            if (irradiance.minCoeff() < 0.0f) chunk.negative.push_back(static_cast<std::uint32_t>(i));
+            if (net_irradiance(v[0].data(), points.normal.col(i)).minCoeff() < 0.0f)
+                chunk.negative.push_back(static_cast<std::uint32_t>(i));
             chunk.squares += static_cast<double>(
                 (v[0].cwiseAbs2() + v[1].cwiseAbs2() + v[2].cwiseAbs2()).sum());
         }
     });
-    parallel_for(first, [&](Index i) {
-        std::array<Eigen::Vector4f, 3> v;
-        std::copy_n(&coarse_[static_cast<std::size_t>(3 * i)], 3, v.begin());
-        store(i, v);
-    }, 4096);
+    parallel_for(first, [&](Index i) { store(i, coarse_[static_cast<std::size_t>(i)]); }, 4096);
     double squares = 0.0;
     negative_.clear();
     for (const Chunk& chunk : chunks) {
@@ -185,15 +179,15 @@ void MovingLight::make_coefficients(const Radiosity& direct) {
     const TransferOperator& transfer = transport_.transfer();
     const PointHierarchy& points = transfer.points;
     coefficients_.resize(4 * static_cast<std::size_t>(transfer.senders()));
-    const auto radiate = [&](Index m, const Eigen::Vector4f* v) {
-        const Vec3 n = points.normal.col(m), reflectance = points.reflectance.col(m);
-        const Eigen::Vector4f irradiance = n.x() * v[0] + n.y() * v[1] + n.z() * v[2];
+    const auto radiate = [&](Index m, const Padded& v) {
+        const Vec3 reflectance = points.reflectance.col(m);
+        const Eigen::Array4f irradiance = net_irradiance(v[0].data(), points.normal.col(m));
         const float* const d = &direct[3 * static_cast<std::size_t>(m)];
         float* const b = &coefficients_[4 * static_cast<std::size_t>(m)];
         for (int c = 0; c < 3; ++c) b[c] = d[c] + reflectance[c] * irradiance[c];
     };
     const Index known = points.begin(std::min(levels_pushed_, transfer.sender_levels));
-    parallel_for(known, [&](Index m) { radiate(m, &coarse_[static_cast<std::size_t>(3 * m)]); }, 1024);
+    parallel_for(known, [&](Index m) { radiate(m, coarse_[static_cast<std::size_t>(m)]); }, 1024);
     push_levels(transfer.sender_levels, radiate);
     transport_.make_coefficients(coefficients_);
 }
@@ -204,10 +198,13 @@ MovingLight::Changes MovingLight::changes() const {
     constexpr Index grain = 2048;
     const auto senders = static_cast<Index>(coefficients_.size() / 4);
     const Index chunks = (senders + grain - 1) / grain;
-    std::vector<Changes> some(static_cast<std::size_t>(chunks) * parts_.size());
+    struct Chunk {
+        Changes sums; // without a list
+        std::vector<LinkColumns::Change> list;
+    };
+    std::vector<Chunk> some(static_cast<std::size_t>(chunks) * parts_.size());
     parallel_for(static_cast<Index>(some.size()), [&](Index chunk) {
-        Changes& changes = some[static_cast<std::size_t>(chunk)];
-        changes.list.resize(1);
+        auto& [sums, list] = some[static_cast<std::size_t>(chunk)];
         const Part& part = parts_[static_cast<std::size_t>(chunk / chunks)];
         const Index begin = chunk % chunks * grain, end = std::min(senders, begin + grain);
         Eigen::Array4f both = Eigen::Array4f::Zero(), old = both, effect = both, waiting = both;
@@ -223,28 +220,26 @@ MovingLight::Changes MovingLight::changes() const {
                 waiting += effect2;
                 continue;
             }
-            changes.list[0].push_back({j, change});
-            changes.links += part.columns.links_of(j);
+            list.push_back({j, change});
+            sums.links += part.columns.links_of(j);
         }
-        changes.both = both.cast<double>();
-        changes.old = old.cast<double>();
-        changes.effect = effect.cast<double>().sum();
-        changes.waiting = waiting.cast<double>().sum();
+        sums.both = both.cast<double>();
+        sums.old = old.cast<double>();
+        sums.effect2 = effect.cast<double>().sum();
+        sums.waiting2 = waiting.cast<double>().sum();
     }, 1);
     Changes all;
     all.list.resize(parts_.size());
     for (std::size_t k = 0; k < some.size(); ++k) {
-        const std::vector<LinkColumns::Change>& list = some[k].list[0];
+        const auto& [sums, list] = some[k];
         std::vector<LinkColumns::Change>& to = all.list[k / static_cast<std::size_t>(chunks)];
         to.insert(to.end(), list.begin(), list.end());
-        all.links += some[k].links;
-        all.effect += some[k].effect;
-        all.waiting += some[k].waiting;
-        all.both += some[k].both;
-        all.old += some[k].old;
+        all.links += sums.links;
+        all.effect2 += sums.effect2;
+        all.waiting2 += sums.waiting2;
+        all.both += sums.both;
+        all.old += sums.old;
     }
-    all.effect = std::sqrt(all.effect);
-    all.waiting = std::sqrt(all.waiting);
     return all;
 }
 
@@ -325,11 +320,12 @@ void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingL
     Changes changed = changes();
     if (follow_brightness(changed)) changed = changes();
     watch.add_to(s.coefficients_seconds);
-    if (last.multiplied > 0.0) {
-        const double came = std::sqrt(std::max(0.0, changed.effect * changed.effect - last.waiting * last.waiting));
-        passed_on_ = std::max(came / last.multiplied, forgetting * passed_on_);
+    if (last.multiplied2 > 0.0) {
+        const double came2 = std::max(0.0, changed.effect2 - last.waiting2);
+        passed_on_ = std::max(std::sqrt(came2 / last.multiplied2), forgetting * passed_on_);
     }
-    s.settled = changed.effect <= options_.tolerance * field_norm_;
+    const double settled2 = std::pow(options_.tolerance * field_norm_, 2);
+    s.settled = changed.effect2 <= settled2;
     if (s.settled) return;
     const double share = static_cast<double>(changed.links) / static_cast<double>(links_);
     s.links_share += share;
@@ -338,9 +334,9 @@ void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingL
         s.settled = s.anew = true;
     } else {
         apply(changed);
-        last.waiting = changed.waiting;
-        last.multiplied = std::sqrt(std::max(0.0, changed.effect * changed.effect - changed.waiting * changed.waiting));
-        s.settled = std::hypot(last.waiting, passed_on_ * last.multiplied) <= options_.tolerance * field_norm_;
+        last.waiting2 = changed.waiting2;
+        last.multiplied2 = std::max(0.0, changed.effect2 - changed.waiting2);
+        s.settled = last.waiting2 + passed_on_ * passed_on_ * last.multiplied2 <= settled2;
     }
     watch.add_to(s.links_seconds);
 }

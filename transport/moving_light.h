@@ -73,7 +73,8 @@ private:
     std::vector<DisplayLink> display_links_;
     std::vector<float> coefficients_;        // the newest
     std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each
-    std::vector<Eigen::Vector4f> coarse_;    // the same of the levels before the display level, pushed
+    using Padded = std::array<Eigen::Vector4f, 3>; // x, y, z; R, G, B, 0 each
+    std::vector<Padded> coarse_;             // the same of the levels before the display level, pushed
     int levels_pushed_ = 0;                  // that hold the product as it is
     VectorIrradiance field_;
     std::optional<PositivityLimiter> limiter_;
@@ -87,17 +88,17 @@ private:
     void make_coefficients(const Radiosity& direct);
     struct Changes {
         std::vector<std::vector<LinkColumns::Change>> list; // of each part, those that cannot wait
-        std::uint64_t links = 0;               // of these
-        double effect = 0.0;                   // of all changes on the field, root of the sum of squares
-        double waiting = 0.0;                  // of those that wait
+        std::uint64_t links = 0; // of these
+        double effect2 = 0.0;    // of all changes on the field, sum of squares
+        double waiting2 = 0.0;   // of those that wait
         /// Sums of new times old coefficients and of old ones squared, each as it counts in the field.
         Eigen::Array4d both = Eigen::Array4d::Zero(), old = Eigen::Array4d::Zero();
     };
     Changes changes() const;
     void apply(const Changes& changes);
     class Stopwatch;
-    struct LastRound { // of the pose: what it multiplied, and what was left, as Changes::effect
-        double multiplied = 0.0, waiting = 0.0;
+    struct LastRound { // of the pose: what it multiplied, and what was left, as Changes::effect2
+        double multiplied2 = 0.0, waiting2 = 0.0;
     };
     void follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& statistics, Stopwatch& watch);
     void start_anew(const Radiosity& direct);
@@ -110,9 +111,8 @@ private:
     static std::vector<Part> make_parts(const TransferOperator& transfer);
     void await_parts();
     void unpack_display_links();
-    std::array<Eigen::Vector4f, 3> with_prediction(Index i, const Eigen::Vector4f& x, const Eigen::Vector4f& y,
-                                                   const Eigen::Vector4f& z) const;
-    void store(Index i, const std::array<Eigen::Vector4f, 3>& value);
+    void store(Index i, const Padded& value);
+    Padded with_prediction(Index i, const Eigen::Vector4f& x, const Eigen::Vector4f& y, const Eigen::Vector4f& z) const;
     template <class Visit>
     void push_levels(int levels, const Visit& visit);
     void push_display();

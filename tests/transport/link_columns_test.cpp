@@ -1,6 +1,5 @@
 #include "transport/link_columns.h"
 
-#include "core/parallel.h"
 #include "core/sampling.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +32,7 @@ Links random_links() {
 
 TEST(LinkColumns, MultiplyAsRowsDo) {
     const Links links = random_links();
-    const LinkColumns columns(links, senders);
+    const LinkColumns columns(links, senders, 0, receivers);
     EXPECT_EQ(columns.links(), links.count(0, receivers));
 
     Rng rng(6, 0);
@@ -45,7 +44,7 @@ TEST(LinkColumns, MultiplyAsRowsDo) {
         changes.push_back({j, coefficient[j]});
     }
     std::vector<Eigen::Vector4f> product(3 * receivers, Eigen::Vector4f::Ones());
-    columns.add_product(changes, product);
+    for (Index block = 0; block < columns.blocks(); ++block) columns.add_product(block, changes, product);
     for (Index i = 0; i < receivers; ++i) {
         Eigen::Matrix<double, 4, 3> expected = Eigen::Matrix<double, 4, 3>::Ones();
         links.for_each(i, [&](std::uint32_t j, const LinkVector& link) {
@@ -57,21 +56,9 @@ TEST(LinkColumns, MultiplyAsRowsDo) {
     }
 }
 
-TEST(LinkColumns, MultiplyTheSameAtAnyNumberOfThreads) {
-    const LinkColumns columns(random_links(), senders);
-    const std::vector<LinkColumns::Change> changes = {{3, {1.0f, 0.3f, 0.1f, 0.0f}}, {77, {0.1f, 0.7f, 0.2f, 0.0f}}};
-    const auto product = [&](int threads) {
-        const ThreadLimit limit(threads);
-        std::vector<Eigen::Vector4f> result(3 * receivers, Eigen::Vector4f::Zero());
-        columns.add_product(changes, result);
-        return result;
-    };
-    EXPECT_EQ(product(1), product(2));
-}
-
 TEST(LinkColumns, KnowTheirNormsAndLengths) {
     const Links links = random_links();
-    const LinkColumns columns(links, senders);
+    const LinkColumns columns(links, senders, 0, receivers);
     std::vector<float> weights(receivers);
     for (Index i = 0; i < receivers; ++i) weights[static_cast<std::size_t>(i)] = static_cast<float>(1 + i % 4);
     std::vector<double> expected(senders);
