@@ -14,7 +14,7 @@ namespace {
 constexpr float only_splatted = 4.0f, only_sampled = 10.0f; // s / R
 constexpr std::uint32_t splatted_rays = 1 << 13;
 constexpr float rays_a_sender = 64.0f; // that count, where all is splatted; of all rays at least:
-constexpr float least_share = 1.0f / 32.0f;
+constexpr float least_share = 1.0f / 8.0f;
 constexpr float golden_section = 0.38196601f; // of a turn, between places one after the other
 
 float radians(float degrees) {
