@@ -4,6 +4,7 @@
 #include "core/sampling.h"
 #include "core/seconds.h"
 #include "transport/accumulator.h"
+#include "transport/pushed_links.h"
 
 #include <algorithm>
 #include <chrono>
@@ -16,10 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 /// The links of a receiver as its children read them when they predict: all that it and its
 /// ancestors stored, summed up by push, but for what is negligible to the children.
-struct PushedRow {
-    std::vector<std::uint32_t> sender;
-    std::vector<LinkVector> value;
-};
+using PushedRow = std::vector<PushedLink>;
 
 /// Links of the display level must exceed so many thresholds.
 constexpr float display_threshold = 4.0f;
@@ -49,7 +47,9 @@ public:
         gather(samples);
         difference_senders(thresholds.kept[0]);
         if (level > 0) subtract_prediction(i, points_.begin(points_.parent_level[level]), parents);
-        threshold(level, thresholds.kept, kept, links_before);
+        kept_.clear();
+        threshold(level, thresholds.kept, links_before);
+        kept = std::vector<PackedLink>(kept_); // no larger than it must be
         if (thresholds.has_children) push_down(thresholds.negligible, pushed);
         clear();
     }
@@ -115,20 +115,19 @@ private:
         const auto index = push_.parents.indices(i);
         const auto weight = push_.parents.values(i);
         for (std::size_t e = 0; e < index.size(); ++e) {
-            const PushedRow& row = parents[index[e] - first_parent];
-            for (std::size_t k = 0; k < row.sender.size(); ++k)
-                predicted_.at(row.sender[k]) += weight[e] * row.value[k];
+            for_each_pushed(parents[index[e] - first_parent], [&](std::uint32_t j, const LinkVector& value) {
+                predicted_.at(j) += weight[e] * value;
+            });
         }
         predicted_.for_each(
             0, points_.end(sender_levels_ - 1),
             [&](std::uint32_t j, const LinkVector& value) { link_.at(j) -= value; });
     }
 
-    /// Moves to `kept` what is stored of link_, and adds it to predicted_.
-    void threshold(int level, const std::vector<float>& smallest, std::vector<PackedLink>& kept,
-                   std::uint64_t& links_before) {
+    /// Moves to kept_ what is stored of link_, and adds it to predicted_.
+    void threshold(int level, const std::vector<float>& smallest, std::uint64_t& links_before) {
         const auto store = [&](std::uint32_t j, const LinkVector& d) {
-            const LinkVector value = packer_.append(j, d, kept);
+            const LinkVector value = packer_.append(j, d, kept_);
             if (!value.isZero(0.0f)) predicted_.at(j) += value;
         };
         // The coarsest senders: what is dropped goes onto those that stay, in proportion to their
@@ -183,13 +182,14 @@ private:
     /// stay, so that the response to uniform light is exact on every level.
     void push_down(float negligible, PushedRow& pushed) {
         const std::uint32_t coarsest = points_.end(0);
+        pushed_.clear();
         predicted_.for_each(
             0, points_.end(sender_levels_ - 1), [&](std::uint32_t j, const LinkVector& value) {
                 const float size2 = value.squaredNorm();
                 if (size2 == 0.0f || (j >= coarsest && size2 < negligible * negligible)) return;
-                pushed.sender.push_back(j);
-                pushed.value.push_back(value);
+                pushed_packer_.append(j, value, pushed_);
             });
+        pushed = PushedRow(pushed_); // likewise
     }
 
     const PointHierarchy& points_;
@@ -200,6 +200,9 @@ private:
     Accumulator<LinkVector> link_;
     Accumulator<LinkVector> predicted_;
     LinkPacker packer_;
+    PushedLinkPacker pushed_packer_;
+    std::vector<PackedLink> kept_; // of the receiver that is being made
+    PushedRow pushed_;
     struct Coarsest {
         float size;
         std::uint32_t sender;
@@ -371,6 +374,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     }
     statistics.patches = rows.made();
     statistics.uncovered_patches = rows.uncovered();
+    std::vector<PushedRow>().swap(parents); // joining takes the links' memory twice
     return join_links(std::move(done));
 }
 
