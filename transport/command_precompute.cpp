@@ -151,7 +151,7 @@ Json statistics_json(const TransferOperator& transfer, const PrecomputeReport& r
         Json of_step = {{"coarse_scale", rounded(step.coarse_scale)},
                         {"rel_rmse", rounded(step.error.rel_rmse)},
                         {"standard_error", rounded(step.error.standard_error)}};
-        if (step.judged.any()) of_step["judged"] = rounded(step.judged.rel_rmse);
+        if (step.judged && step.judged->any()) of_step["judged"] = rounded(step.judged->rel_rmse);
         json["tuning"].push_back(std::move(of_step));
     }
     return json;
@@ -298,7 +298,7 @@ void run(PrecomputeCommand& command) {
     lap(time);
     if (!command.no_verification) {
         if (command.tuned) {
-            verified.error = tuning.steps.back().judged;
+            verified.error = tuning.steps.back().judged.value();
         } else {
             verifier.emplace(fresh_verifier(surface, report, command.options.seed));
             verified.error = verifier->error_of(transfer);

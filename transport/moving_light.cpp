@@ -14,8 +14,7 @@ constexpr double most_links = 0.5;
 /// Of the tolerance, what changes that wait may take: less than all, so that a round that is made
 /// does enough for the light to settle soon.
 constexpr double waiting_share = 0.7;
-/// What is passed on from round to round is the most there was lately: that of a round counts for so much one
-/// later.
+/// What a round passed on counts for so much one later.
 constexpr double forgetting = 0.8;
 
 } // namespace
@@ -308,7 +307,19 @@ bool MovingLight::follow_brightness(const Changes& changes) {
     return true;
 }
 
-void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& s, Stopwatch& watch) {
+void MovingLight::Forecast::found(double effect2) {
+    if (multiplied2_ == 0.0) return;
+    const double came2 = std::max(0.0, effect2 - waiting2_);
+    passed_on_ = std::max(std::sqrt(came2 / multiplied2_), forgetting * passed_on_);
+}
+
+double MovingLight::Forecast::made(double effect2, double waiting2) {
+    waiting2_ = waiting2;
+    multiplied2_ = std::max(0.0, effect2 - waiting2);
+    return waiting2_ + passed_on_ * passed_on_ * multiplied2_;
+}
+
+void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
     if (field_norm_ == 0.0) { // out of the dark there is nothing to follow
         start_anew(direct);
         s.links_share += 1.0;
@@ -320,10 +331,7 @@ void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingL
     Changes changed = changes();
     if (follow_brightness(changed)) changed = changes();
     watch.add_to(s.coefficients_seconds);
-    if (last.multiplied2 > 0.0) {
-        const double came2 = std::max(0.0, changed.effect2 - last.waiting2);
-        passed_on_ = std::max(std::sqrt(came2 / last.multiplied2), forgetting * passed_on_);
-    }
+    forecast_.found(changed.effect2);
     const double settled2 = std::pow(options_.tolerance * field_norm_, 2);
     s.settled = changed.effect2 <= settled2;
     if (s.settled) return;
@@ -334,9 +342,7 @@ void MovingLight::follow_round(const Radiosity& direct, LastRound& last, MovingL
         s.settled = s.anew = true;
     } else {
         apply(changed);
-        last.waiting2 = changed.waiting2;
-        last.multiplied2 = std::max(0.0, changed.effect2 - changed.waiting2);
-        s.settled = last.waiting2 + passed_on_ * passed_on_ * last.multiplied2 <= settled2;
+        s.settled = forecast_.made(changed.effect2, changed.waiting2) <= settled2;
     }
     watch.add_to(s.links_seconds);
 }
@@ -355,11 +361,11 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
     follow_intensity(light);
     const Radiosity direct = transport_.direct_radiosity(light);
     watch.add_to(s.direct_seconds);
-    LastRound last;
+    forecast_.begin_pose();
     while (!s.settled && (s.rounds < options_.most_rounds || options_.most_rounds == 0)) {
         ++s.rounds;
         const double norm_before = field_norm_;
-        follow_round(direct, last, s, watch);
+        follow_round(direct, s, watch);
         if (!s.settled && s.rounds != options_.most_rounds) continue;
         push_display();
         if (!limiter_ && !negative_.empty()) {

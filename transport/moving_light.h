@@ -79,8 +79,21 @@ private:
     VectorIrradiance field_;
     std::optional<PositivityLimiter> limiter_;
     std::vector<std::uint32_t> negative_; // display points whose irradiance is below zero without limiter_
-    /// Of what a round multiplied, the share that came again as changes in the next round of the pose.
-    double passed_on_ = 1.0;
+    /// What is still to come when a round has been made, told by what rounds before passed on to the next. All
+    /// effects are those of changes on the field, sums of squares.
+    class Forecast {
+    public:
+        void begin_pose() { multiplied2_ = 0.0; }
+        /// A round finds changes of this effect.
+        void found(double effect2);
+        /// It has multiplied all but what waits: the effect of the changes that the next one would find.
+        double made(double effect2, double waiting2);
+
+    private:
+        double multiplied2_ = 0.0, waiting2_ = 0.0; // by the last round of the pose, after it
+        double passed_on_ = 1.0; // the most there was lately, a share of what was multiplied
+    };
+    Forecast forecast_;
     double field_norm_ = 0.0; // |field| at the display level
     std::optional<Spotlight> light_; // of the last pose
 
@@ -97,10 +110,7 @@ private:
     Changes changes() const;
     void apply(const Changes& changes);
     class Stopwatch;
-    struct LastRound { // of the pose: what it multiplied, and what was left, as Changes::effect2
-        double multiplied2 = 0.0, waiting2 = 0.0;
-    };
-    void follow_round(const Radiosity& direct, LastRound& last, MovingLightStatistics& statistics, Stopwatch& watch);
+    void follow_round(const Radiosity& direct, MovingLightStatistics& statistics, Stopwatch& watch);
     void start_anew(const Radiosity& direct);
     /// Of a light that changes its intensity alone, all is known.
     void follow_intensity(const Spotlight& light);

@@ -60,7 +60,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
     result = {};
     int times_judged = 0;
     const auto judge = [&](TuningStep& step) {
-        if (tuning.judge) step.judged = tuning.judge(*transfer, report, times_judged++);
+        step.judged = tuning.judge ? tuning.judge(*transfer, report, times_judged++) : VerifiedError();
     };
     for (;;) {
         const double begin = elapsed();
@@ -93,8 +93,8 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         double error = last.error.certain;
         if (error <= safely * tuning.target_error) {
             judge(last);
-            if (last.judged.rel_rmse <= allowed * tuning.target_error) break;
-            error = last.judged.certain;
+            if (last.judged->rel_rmse <= allowed * tuning.target_error) break;
+            error = last.judged->certain;
         }
         result.end = TuningEnd::finest;
         if (last.coarse_scale <= finest_scale || step + 1 == most_steps) break;
@@ -121,9 +121,9 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         options.coarse_scale = static_cast<float>(scale);
     }
     TuningStep& last = result.steps.back();
-    if (!last.judged.any()) judge(last);
+    if (!last.judged) judge(last);
     if (last.error.any() && last.error.certain <= tuning.target_error
-        && last.judged.rel_rmse <= allowed * tuning.target_error)
+        && last.judged->rel_rmse <= allowed * tuning.target_error)
         result.end = TuningEnd::reached;
     return std::move(*transfer);
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace afterglow {
@@ -16,10 +17,10 @@ namespace afterglow {
 Verifier fresh_verifier(const Surface& surface, const PrecomputeReport& report, std::uint64_t seed, int time = 0);
 
 struct TuningStep {
-    float coarse_scale = 1.0f; // of PrecomputeOptions
-    VerifiedError error;       // under lights and at places that all steps share
-    VerifiedError judged;      // under others, see TuningOptions; mostly of the last step alone
-    double seconds = 0.0;      // without the judgement
+    float coarse_scale = 1.0f;           // of PrecomputeOptions
+    VerifiedError error;                 // under lights and at places that all steps share
+    std::optional<VerifiedError> judged; // under others, see TuningOptions; mostly of the last step alone
+    double seconds = 0.0;                // without the judgement
 };
 
 struct TuningOptions {

@@ -91,8 +91,8 @@ TEST(Tuning, GoesOnWhereItsJudgeFindsMoreError) {
     EXPECT_EQ(severe.tuning.end, TuningEnd::reached);
     ASSERT_EQ(severe.tuning.steps.size(), 2u);
     EXPECT_LT(severe.last().coarse_scale, severe.tuning.steps.front().coarse_scale);
-    EXPECT_EQ(severe.tuning.steps.front().judged.rel_rmse, 0.9);
-    EXPECT_EQ(severe.last().judged.rel_rmse, 0.1);
+    EXPECT_EQ(severe.tuning.steps.front().judged->rel_rmse, 0.9);
+    EXPECT_EQ(severe.last().judged->rel_rmse, 0.1);
 
     // A fifth above the target is as good as such a judgement can tell.
     const Tuned lenient({.target_error = 0.4, .judge = [](const auto&...) { return judgement(0.47); }});
@@ -103,7 +103,7 @@ TEST(Tuning, GoesOnWhereItsJudgeFindsMoreError) {
     const Tuned hurried({.target_error = 0.4, .most_seconds = 1e-3, .judge = [](const auto&...) { return judgement(0.9); }});
     EXPECT_EQ(hurried.tuning.steps.size(), 1u);
     EXPECT_EQ(hurried.tuning.end, TuningEnd::most_seconds);
-    EXPECT_EQ(hurried.last().judged.rel_rmse, 0.9);
+    EXPECT_EQ(hurried.last().judged->rel_rmse, 0.9);
 }
 
 TEST(Tuning, TakesTheUsualSpacingWhereThereIsNothingToCompare) {
