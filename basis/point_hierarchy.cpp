@@ -78,7 +78,7 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
             = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
         disk_options.openness_density = density;
-        disk_options.candidates_per_point = by_openness ? 128 : options.candidates_per_point;
+        disk_options.candidates_per_point = by_openness ? 400 : options.candidates_per_point;
         const PoissonDisk disk = poisson_disk(source, disk_options);
 
         std::vector<Openness> placed;
