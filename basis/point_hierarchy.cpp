@@ -14,6 +14,10 @@
 namespace afterglow {
 namespace {
 
+/// On a level placed by openness, see PoissonDiskOptions: with fewer, dark faces are mottled where the display
+/// level has holes, though no error tells.
+constexpr int candidates_per_open_point = 400;
+
 /// Supports of a level whose density varies: a function reaches 1.5 times as far as its fourth
 /// neighbour that faces about the same way, so that everywhere about as many overlap. Distances grow
 /// with the difference in openness as weights fall with it: along a contact a function reaches its
@@ -78,7 +82,8 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
             = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
         disk_options.openness_density = density;
-        disk_options.candidates_per_point = by_openness ? 400 : options.candidates_per_point;
+        disk_options.candidates_per_point
+            = by_openness ? candidates_per_open_point : options.candidates_per_point;
         const PoissonDisk disk = poisson_disk(source, disk_options);
 
         std::vector<Openness> placed;

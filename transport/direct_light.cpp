@@ -58,11 +58,10 @@ float share_of_scale(float scale) {
     return t * t * (3.0f - 2.0f * t);
 }
 
-/// Of the rays, the share that counts where they go so far: as many a sender, the fewer the less of the light
-/// is splatted.
-float counted_share(float scale) {
-    const float splatted = scale * (1.0f - share_of_scale(scale));
-    return std::clamp(rays_a_sender / splatted_rays * static_cast<float>(EIGEN_PI) * splatted * splatted,
+/// Of the rays, the share that counts where s / R times 1 - p is this: as many a sender, the fewer the less of
+/// the light is splatted.
+float counted_share(float splatted_scale) {
+    return std::clamp(rays_a_sender / splatted_rays * static_cast<float>(EIGEN_PI) * splatted_scale * splatted_scale,
                       least_share, 1.0f);
 }
 
@@ -256,9 +255,10 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
         for (Index k = first; k < last; ++k) {
             const Hit& hit = hits[k - first];
             if (!hit) continue;
-            const float counted = counted_share(scale * hit.distance);
+            const float share = 1.0f - share_of_scale(scale * hit.distance);
+            const float counted = counted_share(scale * hit.distance * share);
             if (places[static_cast<std::size_t>(k)].order >= counted) continue;
-            const float splatted = falloff[k - first] * (1.0f - share_of_scale(scale * hit.distance)) / counted;
+            const float splatted = falloff[k - first] * share / counted;
             if (splatted == 0.0f) continue;
             Splat& splat = splats[static_cast<std::size_t>(first / packet)].emplace_back();
             sender_row(surface_, basis(), level_, hit, splat.row);
