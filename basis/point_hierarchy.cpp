@@ -2,7 +2,6 @@
 
 #include "basis/morton.h"
 #include "basis/nearest_points.h"
-#include "basis/poisson_disk.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
 
@@ -13,10 +12,6 @@
 
 namespace afterglow {
 namespace {
-
-/// On a level placed by openness, see PoissonDiskOptions: with fewer, dark faces are mottled where the display
-/// level has holes, though no error tells.
-constexpr int candidates_per_open_point = 400;
 
 /// Supports of a level whose density varies: a function reaches 1.5 times as far as its fourth
 /// neighbour that faces about the same way, so that everywhere about as many overlap. Distances grow
@@ -82,8 +77,7 @@ PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& 
             = by_openness ? options.shape.openness_placement_power : options.shape.placement_power;
         disk_options.skip_narrow = options.skip_narrow && !by_openness;
         disk_options.openness_density = density;
-        disk_options.candidates_per_point
-            = by_openness ? candidates_per_open_point : options.candidates_per_point;
+        disk_options.candidates_per_point = options.candidates_per_point;
         const PoissonDisk disk = poisson_disk(source, disk_options);
 
         std::vector<Openness> placed;

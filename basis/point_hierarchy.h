@@ -2,6 +2,7 @@
 
 #include "basis/candidates.h"
 #include "basis/openness.h"
+#include "basis/poisson_disk.h"
 #include "basis/shepard.h"
 
 #include <Eigen/Core>
@@ -58,7 +59,7 @@ struct HierarchyOptions {
     std::optional<DisplayLevel> display = {};
     BasisShape shape = {};
     bool skip_narrow = true; // on every level but an openness level
-    int candidates_per_point = 48; // of PoissonDiskOptions, likewise; finer levels fill what holes they leave
+    int candidates_per_point = PoissonDiskOptions{}.candidates_per_point;
     std::uint64_t seed = 1;
     std::function<void(double)> progress = {}; // is told the share of the work that is done
 };

@@ -15,8 +15,6 @@
 namespace afterglow {
 namespace {
 
-constexpr std::size_t candidates_per_feature = 48; // a point at most, while features add points
-
 struct Cell {
     std::array<std::int32_t, 27> neighbour; // itself included; -1 where nothing is
     int parity;                             // cells of equal parity never touch
@@ -96,11 +94,11 @@ public:
         : surface_(surface), options_(options),
           probe_(surface, options.spacing) {}
 
-    /// Throws the candidates [begin, end) of the source; accepted[i] tells of begin + i.
+    /// Throws candidates that are numbered from `first` on; accepted[i] tells of round[i].
     /// `refining`: the openness feature may add points closer than R.
-    void throw_darts(const CandidateSource& source, std::size_t begin, std::size_t end, bool refining,
+    void throw_darts(std::span<const Candidate> round, std::size_t first, bool refining,
                      std::vector<char>& accepted) {
-        const std::size_t count = end - begin;
+        const std::size_t count = round.size();
         accepted.assign(count, 0);
         std::vector<std::optional<Openness>> features(refining ? count : 0);
         const auto feature_of = [&](std::size_t i) { return refining ? &features[i] : nullptr; };
@@ -111,36 +109,36 @@ public:
         parallel_for(
             static_cast<Index>(count),
             [&](Index i) {
-                const CellKey key = key_of(source[begin + i].at.position);
+                const CellKey key = key_of(round[i].at.position);
                 order[i] = morton_code(key[0] & 1023, key[1] & 1023, key[2] & 1023) << 32
                            | static_cast<std::uint64_t>(i);
             },
             1024);
         parallel_sort(order);
         constexpr Index at_once = 64; // what they need of memory is asked for before it is used
-        parallel_ranges(static_cast<Index>(count), at_once, [&](Index first, Index last) {
-            const auto candidate = [&](Index k) { return begin + (order[k] & 0xffffffff); };
+        parallel_ranges(static_cast<Index>(count), at_once, [&](Index begin, Index end) {
+            const auto candidate = [&](Index k) { return order[k] & 0xffffffff; };
             std::array<CellKey, at_once> key;
             std::array<std::int32_t, at_once> cell;
-            for (Index k = first; k < last; ++k) __builtin_prefetch(&source[candidate(k)].at);
-            for (Index k = first; k < last; ++k) {
-                key[k - first] = key_of(source[candidate(k)].at.position);
-                index_.prefetch(key[k - first]);
+            for (Index k = begin; k < end; ++k) __builtin_prefetch(&round[candidate(k)].at);
+            for (Index k = begin; k < end; ++k) {
+                key[k - begin] = key_of(round[candidate(k)].at.position);
+                index_.prefetch(key[k - begin]);
             }
-            for (Index k = first; k < last; ++k) {
-                cell[k - first] = index_.find(key[k - first]);
-                if (cell[k - first] >= 0) __builtin_prefetch(&cells_[cell[k - first]]);
+            for (Index k = begin; k < end; ++k) {
+                cell[k - begin] = index_.find(key[k - begin]);
+                if (cell[k - begin] >= 0) __builtin_prefetch(&cells_[cell[k - begin]]);
             }
-            for (Index k = first; k < last; ++k) {
-                const std::size_t i = candidate(k) - begin;
-                const std::int32_t id = cell[k - first];
-                fits_so_far[i] = id < 0 || fits(cells_[id], source[begin + i].at, feature_of(i));
+            for (Index k = begin; k < end; ++k) {
+                const std::size_t i = candidate(k);
+                const std::int32_t id = cell[k - begin];
+                fits_so_far[i] = id < 0 || fits(cells_[id], round[i].at, feature_of(i));
             }
         });
         std::array<std::vector<std::int32_t>, 8> classes;
         for (std::size_t i = 0; i < count; ++i) {
             if (!fits_so_far[i]) continue;
-            const std::int32_t id = cell_of(source[begin + i].at.position);
+            const std::int32_t id = cell_of(round[i].at.position);
             Cell& cell = cells_[id];
             if (cell.waiting.empty()) classes[cell.parity].push_back(id);
             cell.waiting.push_back(static_cast<std::uint32_t>(i));
@@ -151,24 +149,50 @@ public:
                 [&](Index c) {
                     Cell& cell = cells_[same_parity[c]];
                     for (const std::uint32_t i : cell.waiting)
-                        accepted[i] = try_dart(cell, source[begin + i].at, begin + i, feature_of(i));
+                        accepted[i] = try_dart(cell, round[i].at, first + i, feature_of(i));
                     cell.waiting.clear();
                 },
                 16);
     }
 
-    struct Dart {
-        std::size_t candidate;
-        const Openness* openness;
-    };
-    std::vector<Dart> darts() const {
-        std::vector<Dart> all;
+    /// Candidates for the holes around a dart at x: places along its tangent plane a little more than R away.
+    /// Whatever hole there is lies beside such places of all darts around it.
+    void find_holes(const SurfacePoint& x, std::uint64_t seed, std::vector<Candidate>& holes) const {
+        constexpr int directions = 12;
+        const float spacing = options_.spacing;
+        const Frame frame(x.normal);
+        const float turn = Rng(seed, 0x41b).uniform();
+        for (int k = 0; k < directions; ++k) {
+            const float angle = 2.0f * static_cast<float>(M_PI) * (static_cast<float>(k) + turn) / directions;
+            const Vec3 ahead = spacing * frame.to_world(Vec3(std::cos(angle), std::sin(angle), 0.0f));
+            const Vec3 aside = ahead.cross(x.normal);
+            const Vec3 guess = x.position + 1.2f * ahead;
+            const auto covered = [&](const Vec3& place) {
+                const std::int32_t id = index_.find(key_of(place));
+                return id >= 0 && !fits(cells_[id], {place, x.normal}, nullptr);
+            };
+            if (covered(guess)) continue;
+            const Vec3 above = guess + 0.2f * spacing * x.normal;
+            if (surface_.blocked(surface_.lifted(x), above)) continue;
+            const Hit hit = surface_.closest_hit({above, -x.normal, 0.4f * spacing});
+            if (!hit) continue;
+            const SurfacePoint y = surface_.point(hit);
+            const bool enclosed
+                = covered(guess + ahead) + covered(guess + aside) + covered(guess - aside) >= 2;
+            if (enclosed || faces_the_void(y)) holes.push_back({y, hit});
+        }
+    }
+
+    /// Of all darts, in the order of their numbers.
+    std::vector<Openness> openness() const {
+        std::vector<std::pair<std::size_t, const Openness*>> all;
         for (const Cell& cell : cells_)
             for (std::size_t k = 0; k < cell.darts.size(); ++k)
-                all.push_back({cell.candidate[k], &cell.openness[k]});
-        std::sort(all.begin(), all.end(),
-                  [](const Dart& a, const Dart& b) { return a.candidate < b.candidate; });
-        return all;
+                all.emplace_back(cell.candidate[k], &cell.openness[k]);
+        std::sort(all.begin(), all.end());
+        std::vector<Openness> ordered;
+        for (const auto& [number, openness] : all) ordered.push_back(*openness);
+        return ordered;
     }
 
 private:
@@ -207,6 +231,18 @@ private:
                 if (d < options_.spacing && !visit(other, j, d)) return;
             }
         }
+    }
+
+    /// Whether a quarter of what is seen from x is empty. No particle comes from there, though one may look
+    /// from there.
+    bool faces_the_void(const SurfacePoint& x) const {
+        constexpr int rays = 16;
+        const Frame frame(x.normal);
+        int escaped = 0;
+        for (int k = 0; k < rays; ++k)
+            escaped += !surface_.occluded(
+                {surface_.lifted(x), frame.to_world(sample_cosine(scrambled_sobol2(k, 13)))});
+        return 4 * escaped >= rays;
     }
 
     bool narrow(const SurfacePoint& x) const {
@@ -307,31 +343,46 @@ private:
 
 PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options) {
     DartBoard board(source.surface(), options);
-    std::size_t next = options.first_candidate, points = 0;
+    const bool by_openness = options.openness_density > 0.0f;
+    std::size_t next = options.first_candidate;
+    std::vector<Candidate> points;
     std::vector<char> accepted;
+    const auto throw_darts = [&](std::span<const Candidate> round, bool refining) {
+        board.throw_darts(round, next, refining, accepted);
+        next += round.size();
+        const std::size_t before = points.size();
+        for (std::size_t i = 0; i < round.size(); ++i)
+            if (accepted[i]) points.push_back(round[i]);
+        return points.size() - before;
+    };
     // Rounds stay small against what is there already, so that the order of cells leaves no pattern.
-    // Past the first rate, a dart with a feature, which costs rays, changes little: what remains is to
-    // leave no hole.
-    bool refining = options.openness_density > 0.0f;
     for (bool done = false; !done;) {
-        const std::size_t round = std::max<std::size_t>(2048, points / 2);
+        const std::size_t round = std::max<std::size_t>(2048, points.size() / 2);
         source.ensure(next + round);
-        board.throw_darts(source, next, next + round, refining, accepted);
-        const auto fresh = static_cast<std::size_t>(std::count(accepted.begin(), accepted.end(), 1));
-        next += round;
-        points += fresh;
-        if (refining)
-            refining = fresh * candidates_per_feature >= round;
-        else
-            done = fresh * options.candidates_per_point < round;
+        const std::size_t fresh = throw_darts({&source[next], round}, by_openness);
+        done = fresh * options.candidates_per_point < round;
     }
-
     PoissonDisk disk;
-    for (const auto& dart : board.darts()) {
-        disk.points.push_back(source[dart.candidate]);
-        if (options.openness_density > 0.0f) disk.openness.push_back(*dart.openness);
-    }
     disk.candidates_tried = next - options.first_candidate;
+    // What fills a hole may leave smaller ones.
+    constexpr int fills = 3;
+    std::size_t looked_around = 0;
+    for (int fill = 0; fill < fills && by_openness; ++fill) {
+        std::vector<std::vector<Candidate>> holes(points.size() - looked_around);
+        parallel_for(
+            static_cast<Index>(holes.size()),
+            [&](Index i) {
+                const std::size_t k = looked_around + i;
+                board.find_holes(points[k].at, k, holes[i]);
+            },
+            64);
+        looked_around = points.size();
+        std::vector<Candidate> round;
+        for (const auto& around : holes) round.insert(round.end(), around.begin(), around.end());
+        throw_darts(round, false);
+    }
+    disk.points = std::move(points);
+    if (by_openness) disk.openness = board.openness();
     return disk;
 }
 

@@ -20,24 +20,25 @@ struct PoissonDiskOptions {
     /// y conflicts with x if D < R/32, or if D exp(|dF|^2 / (2 s^2)) < R.
     float openness_density = 0.0f;
     std::size_t first_candidate = 0; // where in the source's sequence to begin
-    /// The set is done where a round of darts yields fewer points than one of so many candidates: holes
-    /// are then about 1 / candidates_per_point of the surface.
+    /// Darts are thrown until a round yields fewer points than one of so many: holes are then about
+    /// 1 / candidates_per_point of what candidates find. Where a density is asked, they are filled afterwards.
     int candidates_per_point = 48;
 };
 
 struct PoissonDisk {
     std::vector<Candidate> points;
     std::vector<Openness> openness; // a point each where a density was asked, else empty
-    std::size_t candidates_tried = 0;
+    std::size_t candidates_tried = 0; // of the source
 };
 
-/// A Poisson-disk set of the candidates, maximal but for candidates_per_point, by dart throwing under
+/// A Poisson-disk set of the candidates, maximal but for holes (see candidates_per_point), by dart throwing under
 ///
 ///     D(x, y) = min(d_x(y), d_y(x)) / max(0, n_x . n_y)^power     [LZT08, eq. (11)].
 ///
 /// Cells of size R, in eight classes whose members cannot conflict, are filled in parallel; the
 /// result does not depend on the number of threads. D is never below the Euclidean distance, so the
-/// 27 cells around a candidate decide.
+/// 27 cells around a candidate decide. Holes are found around the darts, not by more candidates, so also where
+/// few of them come; but not beyond the last darts, unless a quarter of what is seen from there is empty.
 PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options);
 
 } // namespace afterglow

@@ -84,6 +84,59 @@ TEST(PoissonDisk, LeavesAsFewHolesAsAsked) {
         }
 }
 
+/// Of so many fresh candidates that are asked for, how many are 1.1 R from all points.
+template <class Asked>
+int deep_in_holes(const PoissonDisk& disk, CandidateSource& source, float spacing, int fresh, const Asked& asked) {
+    int found = 0, deep = 0;
+    for (std::size_t i = disk.candidates_tried; found < fresh; ++i) {
+        source.ensure(i + 1);
+        const SurfacePoint& x = source[i].at;
+        if (!asked(x)) continue;
+        ++found;
+        deep += gap_by_brute_force(disk, x, PoissonDiskOptions{}.placement_power) > 1.1 * spacing;
+    }
+    return deep;
+}
+
+// A feature never differs by this much: darts conflict as where there is none.
+constexpr float no_density = 10.0f;
+
+TEST(PoissonDisk, FillsItsHolesWherePlacedByOpenness) {
+    // A hole is missed only where none of twelve directions from the darts around meets it, or where no
+    // darts are around.
+    for (const Case& c : {cases[0], cases[1], cases[2]}) {
+        const Scene scene = make_builtin_scene(c.scene);
+        const Surface surface(scene);
+        CandidateSource source(surface, {*scene.viewpoint}, 2);
+        const auto deep = [&](float density) {
+            const PoissonDisk disk
+                = poisson_disk(source, {.spacing = c.spacing, .openness_density = density});
+            return deep_in_holes(disk, source, c.spacing, 10'000, [](const SurfacePoint&) { return true; });
+        };
+        const int with_holes = deep(0.0f);
+        EXPECT_GT(with_holes, 20) << c.scene;
+        EXPECT_LT(deep(no_density), with_holes / 2) << c.scene;
+        EXPECT_LE(deep(0.15f), 5) << c.scene;
+    }
+}
+
+TEST(PoissonDisk, FillsItsHolesWhereOnlyTheVoidLooksAt) {
+    // The boxes' sides towards the opening, of which particles from inside see little.
+    const Scene scene = make_builtin_scene("builtin:cornell");
+    const Surface surface(scene);
+    CandidateSource source(surface, {*scene.viewpoint}, 2);
+    constexpr float spacing = 0.02f;
+    const auto deep = [&](float density) {
+        const PoissonDisk disk = poisson_disk(source, {.spacing = spacing, .openness_density = density});
+        return deep_in_holes(disk, source, spacing, 2000, [](const SurfacePoint& x) {
+            return x.normal.z() < -0.9f && x.position.z() < 0.5f;
+        });
+    };
+    const int with_holes = deep(0.0f);
+    EXPECT_GT(with_holes, 30);
+    EXPECT_LT(deep(no_density), with_holes / 10);
+}
+
 TEST(PoissonDisk, LeavesOutNarrowPlacesWhereAsked) {
     // At a distance h from a cube's edge, h much smaller than R, the mean of 1 / distance over
     // cosine-distributed directions is 2 / (3 pi h): narrow where h < R / 28. Sixteen rays measure

@@ -19,6 +19,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <numeric>
 #include <span>
 
 // Accuracy over a set of scenes, run by hand; `references` traces what the others compare with.
@@ -35,21 +36,24 @@ struct Common {
     int threads = 0;
 };
 
-void add_common_options(CLI::App& command, Common& common) {
+void add_scene_options(CLI::App& command, Common& common) {
     command.add_option("--scenes", common.scenes, "JSON list of scenes, beside their folders")
         ->envname("AFTERGLOW_SCENES");
     command.add_option("--lights", common.lights, "JSON list of lights (tests/bench/lights.json)")
         ->required();
     command.add_option("--scene", common.names, "Scenes by their names in the lists")->required();
-    command.add_option("--cache", common.reference.cache, "Folder of the references")->required();
     command.add_option("--points", common.reference.points, "Points at each of two places")
         ->check(CLI::Range(1, 1000000));
+    command.add_option("--threads", common.threads, "Threads to use (0: all processors)");
+}
+
+void add_reference_options(CLI::App& command, Common& common) {
+    command.add_option("--cache", common.reference.cache, "Folder of the references")->required();
     command.add_option("--target-error", common.reference.target_error,
                        "Relative standard error of each light's reference");
     command.add_option("--max-samples", common.reference.max_samples,
                        "Mean paths a point at which tracing gives up");
     command.add_option("--strategy", common.strategy, "Of the path tracer: plain or connected");
-    command.add_option("--threads", common.threads, "Threads to use (0: all processors)");
 }
 
 void print_reference(const AccuracyScene& scene, const AccuracyReference& reference) {
@@ -90,10 +94,28 @@ void run_references(const Common& common) {
 struct MeasureOptions {
     PrecomputeOptions precompute;
     std::string json;
+    int worst = 0;
 };
 
-void add_measure_options(CLI::App& command, MeasureOptions& options) {
-    PrecomputeOptions& p = options.precompute;
+/// The points that add most to the squared error under a light.
+void print_worst(const std::vector<SurfacePoint>& points, const Eigen::Array3Xf& estimate,
+                 const Eigen::Array3Xf& reference, int count) {
+    const Eigen::ArrayXf squared = (estimate - reference).square().colwise().sum().transpose();
+    std::vector<Index> order(points.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) { return squared[a] > squared[b]; });
+    const auto shown = std::min<std::size_t>(count, order.size());
+    for (const Index p : std::span(order).first(shown)) {
+        const SurfacePoint& x = points[p];
+        std::printf("    %5.1f %% of the squared error at %.3f %.3f %.3f, normal %.2f %.2f %.2f: %.3g where %.3g "
+                    "is right, mean %.3g\n",
+                    100.0f * squared[p] / squared.sum(), x.position.x(), x.position.y(), x.position.z(),
+                    x.normal.x(), x.normal.y(), x.normal.z(), estimate.col(p).mean(),
+                    reference.col(p).mean(), reference.mean());
+    }
+}
+
+void add_precompute_options(CLI::App& command, PrecomputeOptions& p) {
     command.add_flag_callback(
         "--paper", [&p] { p = PrecomputeOptions::paper(); },
         "The paper's operator with its defaults, which the options below change");
@@ -108,7 +130,6 @@ void add_measure_options(CLI::App& command, MeasureOptions& options) {
     command.add_option("--openness-density", p.openness_density);
     command.add_option("--sender-density", p.sender_density);
     command.add_option("--seed", p.seed);
-    command.add_option("--json", options.json, "File for all figures");
 }
 
 /// Indirect irradiance at the reference's points; column 3 * point + light.
@@ -154,12 +175,15 @@ void run_measure(const Common& common, const MeasureOptions& options) {
         };
         Json lights = Json::array();
         for (Index l = 0; l < 3; ++l) {
-            const Measures m = measure(of_light(x, l), of_light(reference.irradiance.indirect, l));
+            const Eigen::Array3Xf estimate = of_light(x, l);
+            const Eigen::Array3Xf right = of_light(reference.irradiance.indirect, l);
+            const Measures m = measure(estimate, right);
             const double own = reference.irradiance.relative_error[static_cast<std::size_t>(l)];
             const double net = std::sqrt(std::max(0.0, m.rel_rmse * m.rel_rmse - own * own));
             std::printf("%-18s %5lld %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f\n", name.c_str(),
                         static_cast<long long>(l + 1), 100 * m.rel_rmse, 100 * net, 100 * m.rel_l1,
                         100 * m.bias, 100 * m.median, 100 * m.p95, 100 * m.p99);
+            print_worst(reference.points, estimate, right, options.worst);
             lights.push_back({{"rel_rmse", m.rel_rmse},
                               {"rel_rmse_net", net},
                               {"rel_l1", m.rel_l1},
@@ -196,6 +220,87 @@ void run_measure(const Common& common, const MeasureOptions& options) {
     if (!options.json.empty()) write_file(options.json, all.dump(1) + "\n");
 }
 
+struct MottlingOptions {
+    PrecomputeOptions precompute;
+    int seeds = 4;
+};
+
+/// A pair of points of a visible surface, half the display level's spacing apart at most.
+struct PointPairs {
+    std::vector<SurfacePoint> one, other;
+};
+
+PointPairs close_pairs(const Surface& surface, const std::vector<SurfacePoint>& points, float distance) {
+    PointPairs pairs;
+    Rng rng(1, 0x3077);
+    for (const SurfacePoint& x : points) {
+        const float angle = 2.0f * static_cast<float>(M_PI) * rng.uniform();
+        const Vec3 aside = Frame(x.normal).to_world(Vec3(std::cos(angle), std::sin(angle), 0.0f));
+        const Vec3 above = x.position + distance * (aside + 0.1f * x.normal);
+        const Hit hit = surface.closest_hit({above, -x.normal, 0.2f * distance});
+        if (!hit) continue;
+        const SurfacePoint y = surface.point(hit);
+        if (y.normal.dot(x.normal) < 0.95f) continue;
+        pairs.one.push_back(x);
+        pairs.other.push_back(y);
+    }
+    return pairs;
+}
+
+/// How mottled a picture is: what irradiance at one point against another close by differs from seed to seed,
+/// as a standard deviation of one point against the irradiance there. No error against a reference tells it
+/// from error that is spread out evenly, but the eye does.
+void run_mottling(const Common& common, const MottlingOptions& options) {
+    const ThreadLimit limit(common.threads);
+    std::printf("%-18s %5s %8s %8s %8s  %% of the irradiance there, over %d seeds\n", "scene", "light",
+                "median", "p90", "p99", options.seeds);
+    for (const std::string& name : common.names) {
+        const AccuracyScene described = find_accuracy_scene(name, common.scenes, common.lights);
+        const Scene scene = load_scene(described.path);
+        const Surface surface(scene);
+        const std::vector<SurfacePoint> visible =
+            visible_points(surface, described, common.reference.points, common.reference.seed);
+        PointPairs pairs;
+        Eigen::ArrayXXf at_one, difference; // (pair, light) x seed, of luminance-like means over r, g, b
+        for (int seed = 0; seed < options.seeds; ++seed) {
+            PrecomputeOptions precompute_options = options.precompute;
+            precompute_options.seed += static_cast<std::uint64_t>(seed);
+            const TransferOperator transfer = precompute(surface, precompute_options);
+            if (seed == 0) {
+                pairs = close_pairs(surface, visible, 0.5f * transfer.points.spacing.back());
+                at_one.resize(3 * static_cast<Index>(pairs.one.size()), options.seeds);
+                difference.resizeLike(at_one);
+            }
+            Index uncovered = 0;
+            const auto mean = [&](const std::vector<SurfacePoint>& points) -> Eigen::ArrayXf {
+                return displayed_irradiance(surface, transfer, described, points, uncovered)
+                    .colwise()
+                    .mean()
+                    .transpose();
+            };
+            at_one.col(seed) = mean(pairs.one);
+            difference.col(seed) = at_one.col(seed) - mean(pairs.other);
+        }
+        for (Index l = 0; l < 3; ++l) {
+            std::vector<float> mottling;
+            for (Index k = l; k < at_one.rows(); k += 3) {
+                const float level = at_one.row(k).mean();
+                const float spread = (difference.row(k) - difference.row(k).mean()).square().sum()
+                                     / static_cast<float>(2 * (options.seeds - 1));
+                if (level > 0.0f) mottling.push_back(std::sqrt(spread) / level);
+            }
+            std::sort(mottling.begin(), mottling.end());
+            const auto quantile = [&](double q) {
+                return 100.0f * mottling[static_cast<std::size_t>(q * static_cast<double>(mottling.size() - 1))];
+            };
+            if (mottling.empty()) continue;
+            std::printf("%-18s %5lld %8.2f %8.2f %8.2f\n", name.c_str(), static_cast<long long>(l + 1),
+                        quantile(0.5), quantile(0.9), quantile(0.99));
+        }
+        std::fflush(stdout);
+    }
+}
+
 } // namespace
 } // namespace afterglow
 
@@ -205,14 +310,27 @@ int main(int argc, char** argv) {
     afterglow::Common common;
     CLI::App* references =
         app.add_subcommand("references", "Traces the references and caches them");
-    afterglow::add_common_options(*references, common);
+    afterglow::add_scene_options(*references, common);
+    afterglow::add_reference_options(*references, common);
     references->callback([&] { afterglow::run_references(common); });
     afterglow::MeasureOptions measure_options;
     CLI::App* measure = app.add_subcommand(
         "measure", "Precomputes each scene and compares with its reference, under three lights");
-    afterglow::add_common_options(*measure, common);
-    afterglow::add_measure_options(*measure, measure_options);
+    afterglow::add_scene_options(*measure, common);
+    afterglow::add_reference_options(*measure, common);
+    afterglow::add_precompute_options(*measure, measure_options.precompute);
+    measure->add_option("--json", measure_options.json, "File for all figures");
+    measure->add_option("--worst", measure_options.worst,
+                        "Show so many points that add most to the error of each light");
     measure->callback([&] { afterglow::run_measure(common, measure_options); });
+    afterglow::MottlingOptions mottling_options;
+    CLI::App* mottling = app.add_subcommand(
+        "mottling", "Precomputes each scene with several seeds and compares what close points differ by");
+    afterglow::add_scene_options(*mottling, common);
+    afterglow::add_precompute_options(*mottling, mottling_options.precompute);
+    mottling->add_option("--seeds", mottling_options.seeds, "Seeds one after the other, from --seed on")
+        ->check(CLI::Range(2, 1000));
+    mottling->callback([&] { afterglow::run_mottling(common, mottling_options); });
     try {
         app.parse(argc, argv);
         return 0;
