@@ -17,29 +17,41 @@ OpennessCode encode(const Openness& openness) {
 
 OpennessProbe::OpennessProbe(const Surface& surface, float spacing, int rays)
     : surface_(surface), spacing_(spacing), directions_(3, rays) {
-    // Neighbouring directions share a ray packet: order by sector, then by height.
+    // Neighbouring directions of a half share a ray packet: order by sector, then by height.
     std::vector<Vec2> u(rays);
     for (int k = 0; k < rays; ++k) u[k] = scrambled_sobol2(k, 11);
-    std::sort(u.begin(), u.end(), [](const Vec2& a, const Vec2& b) {
+    const auto before = [](const Vec2& a, const Vec2& b) {
         const int sa = static_cast<int>(a.y() * 4), sb = static_cast<int>(b.y() * 4);
         return sa != sb ? sa < sb : a.x() < b.x();
-    });
+    };
+    std::sort(u.begin(), u.begin() + rays / 2, before);
+    std::sort(u.begin() + rays / 2, u.end(), before);
     for (int k = 0; k < rays; ++k) directions_.col(k) = sample_vector_irradiance(u[k]);
 }
 
-Openness OpennessProbe::operator()(const SurfacePoint& x) const {
-    constexpr int most = 64;
+Openness OpennessProbe::first_half(const SurfacePoint& x) const {
+    return estimate(x, 0, directions_.cols() / 2);
+}
+
+Openness OpennessProbe::completed(const SurfacePoint& x, const Openness& first_half) const {
+    const Index half = directions_.cols() / 2, all = directions_.cols();
+    const float share = static_cast<float>(half) / static_cast<float>(all);
+    return share * first_half + (1.0f - share) * estimate(x, half, all);
+}
+
+Openness OpennessProbe::estimate(const SurfacePoint& x, Index first, Index last) const {
+    constexpr Index most = 64;
     std::array<Ray, most> rays;
     std::array<Hit, most> hits;
     const Frame frame(x.normal);
     const Vec3 origin = surface_.lifted(x);
     Openness sum = Openness::Zero();
-    for (int begin = 0; begin < directions_.cols(); begin += most) {
-        const int count = std::min<int>(most, static_cast<int>(directions_.cols()) - begin);
-        for (int k = 0; k < count; ++k)
+    for (Index begin = first; begin < last; begin += most) {
+        const Index count = std::min(most, last - begin);
+        for (Index k = 0; k < count; ++k)
             rays[k] = {origin, frame.to_world(directions_.col(begin + k)), 16.0f * spacing_};
         surface_.closest_hits(std::span(rays).first(count), std::span(hits).first(count));
-        for (int k = 0; k < count; ++k) {
+        for (Index k = 0; k < count; ++k) {
             const float weight = 2.0f / (directions_(2, begin + k) + 0.5f);
             // exp(-t/D) for the longest D; the next, a quarter as long, has its fourth power.
             float near = hits[k] ? std::exp(-hits[k].distance / (4.0f * spacing_)) : 0.0f;
@@ -49,7 +61,7 @@ Openness OpennessProbe::operator()(const SurfacePoint& x) const {
             }
         }
     }
-    sum /= static_cast<float>(directions_.cols());
+    sum /= static_cast<float>(last - first);
     for (int d = 0; d < openness_distances; ++d) sum.segment<3>(3 * d) -= x.normal;
     return sum;
 }

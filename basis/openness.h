@@ -33,13 +33,18 @@ inline Openness decode(const OpennessCode& code) { return code.cast<float>() / 6
 class OpennessProbe {
 public:
     OpennessProbe(const Surface& surface, float spacing, int rays = openness_rays);
-    Openness operator()(const SurfacePoint& x) const;
+    Openness operator()(const SurfacePoint& x) const { return completed(x, first_half(x)); }
+    /// The estimate from half of the rays, for where that is enough, and what it becomes with the others.
+    Openness first_half(const SurfacePoint& x) const;
+    Openness completed(const SurfacePoint& x, const Openness& first_half) const;
     int rays() const { return static_cast<int>(directions_.cols()); }
 
 private:
     const Surface& surface_;
     float spacing_;
     Eigen::Matrix3Xf directions_; // about +z
+
+    Openness estimate(const SurfacePoint& x, Index begin, Index end) const; // with these directions
 };
 
 /// How different two points see the world: sum_k |F_k(x) - n_x - (F_k(y) - n_y)|^2.

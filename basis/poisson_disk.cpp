@@ -15,11 +15,15 @@
 namespace afterglow {
 namespace {
 
+struct DartOpenness {
+    Openness first_half, whole; // of OpennessProbe
+};
+
 struct Cell {
     std::array<std::int32_t, 27> neighbour; // itself included; -1 where nothing is
     int parity;                             // cells of equal parity never touch
     std::vector<SurfacePoint> darts;        // apart from what is seldom asked of them:
-    std::vector<Openness> openness;         // one a dart
+    std::vector<DartOpenness> openness;     // one a dart
     std::vector<std::size_t> candidate;     // likewise
     std::vector<std::uint32_t> waiting;     // candidates of this round, by place in the round
 };
@@ -100,7 +104,7 @@ public:
                      std::vector<char>& accepted) {
         const std::size_t count = round.size();
         accepted.assign(count, 0);
-        std::vector<std::optional<Openness>> features(refining ? count : 0);
+        std::vector<Feature> features(refining ? count : 0);
         const auto feature_of = [&](std::size_t i) { return refining ? &features[i] : nullptr; };
         // Most conflict with darts of earlier rounds already, in whatever order they are looked at: one
         // beside the other, so that what is around is in the cache.
@@ -158,7 +162,7 @@ public:
     /// Candidates for the holes around a dart at x: places along its tangent plane a little more than R away.
     /// Whatever hole there is lies beside such places of all darts around it.
     void find_holes(const SurfacePoint& x, std::uint64_t seed, std::vector<Candidate>& holes) const {
-        constexpr int directions = 12;
+        constexpr int directions = 8;
         const float spacing = options_.spacing;
         const Frame frame(x.normal);
         const float turn = Rng(seed, 0x41b).uniform();
@@ -188,7 +192,7 @@ public:
         std::vector<std::pair<std::size_t, const Openness*>> all;
         for (const Cell& cell : cells_)
             for (std::size_t k = 0; k < cell.darts.size(); ++k)
-                all.emplace_back(cell.candidate[k], &cell.openness[k]);
+                all.emplace_back(cell.candidate[k], &cell.openness[k].whole);
         std::sort(all.begin(), all.end());
         std::vector<Openness> ordered;
         for (const auto& [number, openness] : all) ordered.push_back(*openness);
@@ -197,8 +201,12 @@ public:
 
 private:
     struct Near {
-        const Openness* openness;
+        const DartOpenness* openness;
         float distance;
+    };
+    /// A candidate's openness, as far as it was asked for.
+    struct Feature {
+        std::optional<Openness> first_half, whole;
     };
 
     /// Calls visit(cell, number in it, D) for the darts with D < R until it returns false.
@@ -260,7 +268,7 @@ private:
 
     /// Whether x, in this cell, conflicts with no dart that is there. `feature`: null unless refining; is
     /// set where it decides.
-    bool fits(const Cell& cell, const SurfacePoint& x, std::optional<Openness>* feature) const {
+    bool fits(const Cell& cell, const SurfacePoint& x, Feature* feature) const {
         bool conflict = false;
         if (!feature) {
             for_each_near(cell, x, [&](const Cell&, std::size_t, float) {
@@ -282,9 +290,15 @@ private:
         if (conflict) return false;
         std::swap(near[0], near[closest]);
         const std::span<const Near> found(near.data(), count);
-        if (!*feature) *feature = probe_(x);
+        // What differs by less than half of what is asked for with half of the rays is not looked at with all.
+        if (!feature->first_half) feature->first_half = probe_.first_half(x);
+        for (const Near& n : found)
+            if (4.0f * openness_difference2(*feature->first_half, n.openness->first_half)
+                < most_difference2(n.distance))
+                return false;
+        if (!feature->whole) feature->whole = probe_.completed(x, *feature->first_half);
         return std::none_of(found.begin(), found.end(), [&](const Near& n) {
-            return openness_difference2(**feature, *n.openness) < most_difference2(n.distance);
+            return openness_difference2(*feature->whole, n.openness->whole) < most_difference2(n.distance);
         });
     }
 
@@ -294,15 +308,16 @@ private:
         return 2.0f * s * s * std::log(options_.spacing / distance);
     }
 
-    bool try_dart(Cell& cell, const SurfacePoint& x, std::size_t candidate,
-                  std::optional<Openness>* feature) const {
+    bool try_dart(Cell& cell, const SurfacePoint& x, std::size_t candidate, Feature* feature) const {
         if (!fits(cell, x, feature)) return false;
         if (!feature && options_.skip_narrow && narrow(x)) return false;
-        Openness openness = Openness::Zero();
-        if (feature && *feature)
-            openness = **feature;
-        else if (options_.openness_density > 0.0f)
-            openness = probe_(x);
+        DartOpenness openness{Openness::Zero(), Openness::Zero()};
+        if (feature) {
+            openness = {*feature->first_half, *feature->whole};
+        } else if (options_.openness_density > 0.0f) {
+            openness.first_half = probe_.first_half(x);
+            openness.whole = probe_.completed(x, openness.first_half);
+        }
         cell.darts.push_back(x);
         cell.openness.push_back(openness);
         cell.candidate.push_back(candidate);
