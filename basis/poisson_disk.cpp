@@ -359,45 +359,50 @@ private:
 PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options) {
     DartBoard board(source.surface(), options);
     const bool by_openness = options.openness_density > 0.0f;
-    std::size_t next = options.first_candidate;
-    std::vector<Candidate> points;
+    PoissonDisk disk;
+    std::size_t thrown = 0;
     std::vector<char> accepted;
     const auto throw_darts = [&](std::span<const Candidate> round, bool refining) {
-        board.throw_darts(round, next, refining, accepted);
-        next += round.size();
-        const std::size_t before = points.size();
+        board.throw_darts(round, thrown, refining, accepted);
+        thrown += round.size();
+        const std::size_t before = disk.points.size();
         for (std::size_t i = 0; i < round.size(); ++i)
-            if (accepted[i]) points.push_back(round[i]);
-        return points.size() - before;
+            if (accepted[i]) disk.points.push_back(round[i]);
+        return disk.points.size() - before; // how many fitted
     };
     // Rounds stay small against what is there already, so that the order of cells leaves no pattern.
-    for (bool done = false; !done;) {
-        const std::size_t round = std::max<std::size_t>(2048, points.size() / 2);
-        source.ensure(next + round);
-        const std::size_t fresh = throw_darts({&source[next], round}, by_openness);
-        done = fresh * options.candidates_per_point < round;
-    }
-    PoissonDisk disk;
-    disk.candidates_tried = next - options.first_candidate;
+    const auto throw_candidates = [&](std::size_t per_point, bool refining) {
+        for (bool done = false; !done;) {
+            const std::size_t round = std::max<std::size_t>(2048, disk.points.size() / 2);
+            const std::size_t next = options.first_candidate + disk.candidates_tried;
+            source.ensure(next + round);
+            done = per_point * throw_darts({&source[next], round}, refining) < round;
+            disk.candidates_tried += round;
+        }
+    };
+    throw_candidates(options.candidates_per_point, by_openness);
+    if (!by_openness) return disk;
+
     // What fills a hole may leave smaller ones.
     constexpr int fills = 3;
     std::size_t looked_around = 0;
-    for (int fill = 0; fill < fills && by_openness; ++fill) {
-        std::vector<std::vector<Candidate>> holes(points.size() - looked_around);
+    for (int fill = 0; fill < fills; ++fill) {
+        std::vector<std::vector<Candidate>> holes(disk.points.size() - looked_around);
         parallel_for(
             static_cast<Index>(holes.size()),
             [&](Index i) {
                 const std::size_t k = looked_around + i;
-                board.find_holes(points[k].at, k, holes[i]);
+                board.find_holes(disk.points[k].at, k, holes[i]);
             },
             64);
-        looked_around = points.size();
+        looked_around = disk.points.size();
         std::vector<Candidate> round;
         for (const auto& around : holes) round.insert(round.end(), around.begin(), around.end());
         throw_darts(round, false);
     }
-    disk.points = std::move(points);
-    if (by_openness) disk.openness = board.openness();
+    // What is left are strips too narrow to be found like that, for many darts; but these cast no rays.
+    throw_candidates(800, false);
+    disk.openness = board.openness();
     return disk;
 }
 
