@@ -225,13 +225,11 @@ struct MottlingOptions {
     int seeds = 4;
 };
 
-/// A pair of points of a visible surface, half the display level's spacing apart at most.
-struct PointPairs {
-    std::vector<SurfacePoint> one, other;
-};
-
-PointPairs close_pairs(const Surface& surface, const std::vector<SurfacePoint>& points, float distance) {
-    PointPairs pairs;
+/// Pairs of neighbours in the list: each point that has one beside it on the same surface, at this distance, and
+/// that one.
+std::vector<SurfacePoint> close_pairs(const Surface& surface, const std::vector<SurfacePoint>& points,
+                                      float distance) {
+    std::vector<SurfacePoint> pairs;
     Rng rng(1, 0x3077);
     for (const SurfacePoint& x : points) {
         const float angle = 2.0f * static_cast<float>(M_PI) * rng.uniform();
@@ -241,8 +239,8 @@ PointPairs close_pairs(const Surface& surface, const std::vector<SurfacePoint>& 
         if (!hit) continue;
         const SurfacePoint y = surface.point(hit);
         if (y.normal.dot(x.normal) < 0.95f) continue;
-        pairs.one.push_back(x);
-        pairs.other.push_back(y);
+        pairs.push_back(x);
+        pairs.push_back(y);
     }
     return pairs;
 }
@@ -260,26 +258,24 @@ void run_mottling(const Common& common, const MottlingOptions& options) {
         const Surface surface(scene);
         const std::vector<SurfacePoint> visible =
             visible_points(surface, described, common.reference.points, common.reference.seed);
-        PointPairs pairs;
-        Eigen::ArrayXXf at_one, difference; // (pair, light) x seed, of luminance-like means over r, g, b
+        std::vector<SurfacePoint> pairs;
+        Eigen::ArrayXXf at_one, difference; // (pair, light) x seed, of means over r, g, b
         for (int seed = 0; seed < options.seeds; ++seed) {
             PrecomputeOptions precompute_options = options.precompute;
             precompute_options.seed += static_cast<std::uint64_t>(seed);
             const TransferOperator transfer = precompute(surface, precompute_options);
             if (seed == 0) {
                 pairs = close_pairs(surface, visible, 0.5f * transfer.points.spacing.back());
-                at_one.resize(3 * static_cast<Index>(pairs.one.size()), options.seeds);
+                at_one.resize(3 * static_cast<Index>(pairs.size() / 2), options.seeds);
                 difference.resizeLike(at_one);
             }
             Index uncovered = 0;
-            const auto mean = [&](const std::vector<SurfacePoint>& points) -> Eigen::ArrayXf {
-                return displayed_irradiance(surface, transfer, described, points, uncovered)
-                    .colwise()
-                    .mean()
-                    .transpose();
-            };
-            at_one.col(seed) = mean(pairs.one);
-            difference.col(seed) = at_one.col(seed) - mean(pairs.other);
+            const Eigen::Array3Xf x = displayed_irradiance(surface, transfer, described, pairs, uncovered);
+            for (Index row = 0; row < at_one.rows(); ++row) {
+                const Index one = 6 * (row / 3) + row % 3, other = one + 3; // columns are 3 * point + light
+                at_one(row, seed) = x.col(one).mean();
+                difference(row, seed) = at_one(row, seed) - x.col(other).mean();
+            }
         }
         for (Index l = 0; l < 3; ++l) {
             std::vector<float> mottling;
@@ -321,7 +317,8 @@ int main(int argc, char** argv) {
     afterglow::add_precompute_options(*measure, measure_options.precompute);
     measure->add_option("--json", measure_options.json, "File for all figures");
     measure->add_option("--worst", measure_options.worst,
-                        "Show so many points that add most to the error of each light");
+                        "Show so many points that add most to the error of each light")
+        ->check(CLI::NonNegativeNumber);
     measure->callback([&] { afterglow::run_measure(common, measure_options); });
     afterglow::MottlingOptions mottling_options;
     CLI::App* mottling = app.add_subcommand(
