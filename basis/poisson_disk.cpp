@@ -371,12 +371,12 @@ PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& opti
         return disk.points.size() - before; // how many fitted
     };
     // Rounds stay small against what is there already, so that the order of cells leaves no pattern.
-    const auto throw_candidates = [&](std::size_t per_point, bool refining) {
+    const auto throw_candidates = [&](int per_point, bool refining) {
         for (bool done = false; !done;) {
             const std::size_t round = std::max<std::size_t>(2048, disk.points.size() / 2);
-            const std::size_t next = options.first_candidate + disk.candidates_tried;
-            source.ensure(next + round);
-            done = per_point * throw_darts({&source[next], round}, refining) < round;
+            source.ensure(disk.candidates_tried + round);
+            const std::size_t fitted = throw_darts({&source[disk.candidates_tried], round}, refining);
+            done = static_cast<std::size_t>(per_point) * fitted < round;
             disk.candidates_tried += round;
         }
     };
@@ -401,7 +401,7 @@ PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& opti
         throw_darts(round, false);
     }
     // What is left are strips too narrow to be found like that, for many darts; but these cast no rays.
-    throw_candidates(800, false);
+    throw_candidates(options.candidates_per_last_point, false);
     disk.openness = board.openness();
     return disk;
 }

@@ -19,11 +19,10 @@ struct PoissonDiskOptions {
     /// With a density s > 0, points may come as close as R/32 where the openness feature changes:
     /// y conflicts with x if D < R/32, or if D exp(|dF|^2 / (2 s^2)) < R.
     float openness_density = 0.0f;
-    std::size_t first_candidate = 0; // where in the source's sequence to begin
     /// Darts are thrown until a round yields fewer points than one of so many: holes are then about
     /// 1 / candidates_per_point of what candidates find. Where a density is asked, they are filled afterwards, and
-    /// darts go on until one in 800 fits.
-    int candidates_per_point = 48;
+    /// darts without a feature go on until one of `candidates_per_last_point` fits.
+    int candidates_per_point = 48, candidates_per_last_point = 800;
 };
 
 struct PoissonDisk {
