@@ -241,29 +241,34 @@ private:
         }
     }
 
+    /// Sixteen directions over x, of equal shares of a lambertian's light.
+    static std::array<Vec3, 16> directions_over(const SurfacePoint& x) {
+        const Frame frame(x.normal);
+        std::array<Vec3, 16> directions;
+        for (std::size_t k = 0; k < directions.size(); ++k)
+            directions[k] = frame.to_world(sample_cosine(scrambled_sobol2(static_cast<std::uint32_t>(k), 13)));
+        return directions;
+    }
+
     /// Whether a quarter of what is seen from x is empty. No particle comes from there, though one may look
     /// from there.
     bool faces_the_void(const SurfacePoint& x) const {
-        constexpr int rays = 16;
-        const Frame frame(x.normal);
-        int escaped = 0;
-        for (int k = 0; k < rays; ++k)
-            escaped += !surface_.occluded(
-                {surface_.lifted(x), frame.to_world(sample_cosine(scrambled_sobol2(k, 13)))});
-        return 4 * escaped >= rays;
+        const auto directions = directions_over(x);
+        const auto escaped = std::ranges::count_if(directions, [&](const Vec3& direction) {
+            return !surface_.occluded({surface_.lifted(x), direction});
+        });
+        return 4 * escaped >= std::ssize(directions);
     }
 
     bool narrow(const SurfacePoint& x) const {
-        constexpr int rays = 16;
         const float reach = 3.0f * options_.spacing;
-        const Frame frame(x.normal);
+        const auto directions = directions_over(x);
         float inverse_sum = 0.0f;
-        for (int k = 0; k < rays; ++k) {
-            const Vec3 direction = frame.to_world(sample_cosine(scrambled_sobol2(k, 13)));
+        for (const Vec3& direction : directions) {
             const Hit hit = surface_.closest_hit({surface_.lifted(x), direction, reach});
             inverse_sum += 1.0f / std::max(hit ? hit.distance : reach, 1e-6f * reach);
         }
-        return static_cast<float>(rays) / inverse_sum < options_.spacing / 6.0f;
+        return static_cast<float>(directions.size()) / inverse_sum < options_.spacing / 6.0f;
     }
 
     /// Whether x, in this cell, conflicts with no dart that is there. `feature`: null unless refining; is
