@@ -5,12 +5,13 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace afterglow {
 namespace {
 
 constexpr float distances[openness_distances] = {0.0625f, 0.25f, 1.0f, 4.0f}; // D_k in units of R
-constexpr double pi = EIGEN_PI;
+using std::numbers::pi;
 
 /// F_k - n at (h, 0, 0) in a right-angled corner whose wall is x = 0: a ray meets the wall after
 /// h / -omega_x, and what is farther than 16 R is not seen. Midpoint rule over (cos, phi).

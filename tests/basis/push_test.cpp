@@ -1,6 +1,6 @@
 #include "basis/push.h"
 #include "core/builtin_scenes.h"
-#include "core/sampling.h"
+#include "tests/support/random_values.h"
 
 #include <gtest/gtest.h>
 
@@ -9,13 +9,13 @@
 namespace afterglow {
 namespace {
 
-struct Example {
+struct PushExample {
     Scene scene = make_builtin_scene("builtin:cornell");
     Surface surface{scene};
     PointHierarchy points;
     PushOperator push;
 
-    Example() {
+    PushExample() {
         CandidateSource source(surface, {*scene.viewpoint}, 1);
         points = build_hierarchy(source, {.coarse_radius = 0.16f,
                                           .levels = 3,
@@ -24,21 +24,13 @@ struct Example {
     }
 };
 
-const Example& example() {
-    static const Example made;
+const PushExample& push_example() {
+    static const PushExample made;
     return made;
 }
 
-std::vector<float> random_values(std::size_t count, std::uint64_t seed) {
-    Rng rng(seed, 0);
-    std::vector<float> values(count);
-    for (float& v : values)
-        v = rng.uniform() - 0.3f;
-    return values;
-}
-
 TEST(PushOperator, AddsWhatTheLevelAboveOfEachPointPredicts) {
-    const auto& [scene, surface, points, push] = example();
+    const auto& [scene, surface, points, push] = push_example();
     for (const int levels : {1, 2, 4}) {
         const std::vector<float> coefficients = random_values(3 * points.size(), 1);
         std::vector<float> values = coefficients;
@@ -55,7 +47,7 @@ TEST(PushOperator, AddsWhatTheLevelAboveOfEachPointPredicts) {
 }
 
 TEST(PushOperator, HasParentsOnTheLevelAboveThatSumToOne) {
-    const auto& [scene, surface, points, push] = example();
+    const auto& [scene, surface, points, push] = push_example();
     const ShepardBasis basis(points, surface, true);
     int orphans = 0;
     std::vector<BasisEntry> row;
@@ -85,7 +77,7 @@ TEST(PushOperator, HasParentsOnTheLevelAboveThatSumToOne) {
 }
 
 TEST(PushOperator, DifferenceIsItsInverse) {
-    const auto& [scene, surface, points, push] = example();
+    const auto& [scene, surface, points, push] = push_example();
     for (const int channels : {1, 3, 9})
         for (const int levels : {1, 3, 4}) {
             const std::vector<float> values = random_values(channels * points.size(), 2);
@@ -106,7 +98,7 @@ TEST(PushOperator, DifferenceIsItsInverse) {
 }
 
 TEST(PushOperator, CarriesConstantsFromTheCoarsestLevelDown) {
-    const auto& [scene, surface, points, push] = example();
+    const auto& [scene, surface, points, push] = push_example();
     std::vector<float> values(points.size(), 0.0f);
     std::vector<char> covered(points.size(), 0);
     for (std::uint32_t i = 0; i < points.size(); ++i) {

@@ -1,6 +1,6 @@
 #include "basis/pyramid.h"
 #include "core/builtin_scenes.h"
-#include "core/sampling.h"
+#include "tests/support/random_values.h"
 #include "tests/support/shepard_oracle.h"
 
 #include <gtest/gtest.h>
@@ -12,14 +12,14 @@ namespace afterglow {
 namespace {
 
 /// A hierarchy of the printed shape.
-struct Example {
+struct PyramidExample {
     Scene scene = make_builtin_scene("builtin:cornell");
     Surface surface{scene};
     PointHierarchy points;
     Pyramid pyramid;
     PullOperator pull;
 
-    Example() {
+    PyramidExample() {
         CandidateSource source(surface, {*scene.viewpoint}, 1);
         points = build_hierarchy(
             source, {.coarse_radius = 0.2f, .levels = 4, .shape = BasisShape::paper()});
@@ -29,17 +29,9 @@ struct Example {
     }
 };
 
-const Example& example() {
-    static const Example made;
+const PyramidExample& pyramid_example() {
+    static const PyramidExample made;
     return made;
-}
-
-std::vector<float> random_values(std::size_t count, std::uint64_t seed) {
-    Rng rng(seed, 0);
-    std::vector<float> values(count);
-    for (float& v : values)
-        v = rng.uniform() - 0.3f;
-    return values;
 }
 
 /// sum_k B_k(x) alpha_k over the levels [0, levels), by the formula.
@@ -53,7 +45,7 @@ double synthesis(const PointHierarchy& points, int levels, const SurfacePoint& x
 }
 
 TEST(Pyramid, HasWhatTheCoarserLevelsDoNotSayAsCoefficients) {
-    const auto& [scene, surface, points, pyramid, pull] = example();
+    const auto& [scene, surface, points, pyramid, pull] = pyramid_example();
     for (const int levels : {1, 3, 4}) {
         const std::vector<float> values = random_values(2 * points.end(levels - 1), 1);
         std::vector<float> coefficients = values;
@@ -69,7 +61,7 @@ TEST(Pyramid, HasWhatTheCoarserLevelsDoNotSayAsCoefficients) {
 }
 
 TEST(Pyramid, HasAConstantOnTheFirstLevelThatCoversAPoint) {
-    const auto& [scene, surface, points, pyramid, pull] = example();
+    const auto& [scene, surface, points, pyramid, pull] = pyramid_example();
     std::vector<float> values(points.size(), 3.0f);
     pyramid.analyse(points, 4, 1, values);
     std::uint32_t covered = 0;
@@ -82,7 +74,7 @@ TEST(Pyramid, HasAConstantOnTheFirstLevelThatCoversAPoint) {
 }
 
 TEST(PointPull, MakesAFunctionTheMeanOfItsChildren) {
-    const auto& [scene, surface, points, pyramid, pull] = example();
+    const auto& [scene, surface, points, pyramid, pull] = pyramid_example();
     ASSERT_EQ(pull.children.rows(), points.begin(2));
     std::vector<std::map<std::uint32_t, double>> expected(points.begin(2));
     for (int l = 0; l < 2; ++l)

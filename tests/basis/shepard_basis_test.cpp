@@ -15,12 +15,12 @@ namespace afterglow {
 namespace {
 
 /// A built-in scene with a small hierarchy over it: three levels, the last by openness.
-struct Example {
+struct BasisExample {
     Scene scene;
     Surface surface;
     PointHierarchy points;
 
-    Example(const std::string& name, float coarse_radius, BasisShape shape = {})
+    BasisExample(const std::string& name, float coarse_radius, BasisShape shape = {})
         : scene(make_builtin_scene(name)), surface(scene) {
         CandidateSource source(surface, find_viewpoints(surface, 1), 1);
         HierarchyOptions options;
@@ -53,7 +53,7 @@ float sum_of(const std::vector<BasisEntry>& row) {
 TEST(ShepardBasis, SumsToOneWhereItCoversAndIsNeverNegative) {
     for (const auto& [name, radius] :
          {std::pair("builtin:cornell", 0.12f), {"builtin:two_rooms", 1.0f}}) {
-        const Example example(name, radius);
+        const BasisExample example(name, radius);
         const ShepardBasis basis(example.points, example.surface, true);
         int covered = 0, all = 0;
         std::vector<BasisEntry> row;
@@ -79,7 +79,7 @@ TEST(ShepardBasis, SumsToOneWhereItCoversAndIsNeverNegative) {
 }
 
 /// Compares every value with the formula, evaluated function by function.
-void expect_formula(const Example& example, bool see_walls, int count) {
+void expect_formula(const BasisExample& example, bool see_walls, int count) {
     const ShepardBasis basis(example.points, example.surface, see_walls);
     std::vector<BasisEntry> row;
     int walls = 0, unlike = 0;
@@ -126,15 +126,15 @@ void expect_formula(const Example& example, bool see_walls, int count) {
 }
 
 TEST(ShepardBasis, IsItsFormula) {
-    const Example example("builtin:cornell", 0.12f);
+    const BasisExample example("builtin:cornell", 0.12f);
     expect_formula(example, false, 300);
     expect_formula(example, true, 300);
-    expect_formula(Example("builtin:cornell", 0.12f, BasisShape::paper()), false, 100);
+    expect_formula(BasisExample("builtin:cornell", 0.12f, BasisShape::paper()), false, 100);
 }
 
 TEST(ShepardBasis, GivesWhatStandsBehindAThinWallNextToNothing) {
     // Pillars against a wall's end: the door of two rooms. A wall 5 cm thick, supports of 1.5 m.
-    const Example example("builtin:two_rooms", 1.0f);
+    const BasisExample example("builtin:two_rooms", 1.0f);
     const ShepardBasis blind(example.points, example.surface, false);
     const ShepardBasis seeing(example.points, example.surface, true);
     std::vector<BasisEntry> row;
@@ -194,7 +194,7 @@ TEST(ShepardBasis, SeesASheetThatLiesCloserThanItsLift) {
 }
 
 TEST(ShepardBasis, TakesTheClosestFunctionInSightWhereNoneCovers) {
-    const Example example("builtin:two_rooms", 1.0f);
+    const BasisExample example("builtin:two_rooms", 1.0f);
     // Supports so short that hardly anything is covered.
     PointHierarchy sparse = example.points;
     sparse.support *= 0.1f;
@@ -227,7 +227,7 @@ TEST(ShepardBasis, TakesTheClosestFunctionInSightWhereNoneCovers) {
 }
 
 TEST(ShepardBasis, FactorsFoundAtAPlaceMakeItsRow) {
-    const Example example("builtin:cornell", 0.12f);
+    const BasisExample example("builtin:cornell", 0.12f);
     const ShepardBasis basis(example.points, example.surface, true);
     std::vector<BasisEntry> factors, row, expected;
     int nearest = 0;
@@ -255,7 +255,7 @@ TEST(ShepardBasis, FactorsFoundAtAPlaceMakeItsRow) {
 }
 
 TEST(ShepardBasis, AppendsToARow) {
-    const Example example("builtin:cornell", 0.12f);
+    const BasisExample example("builtin:cornell", 0.12f);
     const ShepardBasis basis(example.points, example.surface, true);
     const SurfacePoint x = example.points.point(0);
     std::vector<BasisEntry> alone, behind{{7, 0.25f}};

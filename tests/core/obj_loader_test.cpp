@@ -13,7 +13,7 @@
 namespace afterglow {
 namespace {
 
-const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+const std::string square_corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
 Scene load_text(const std::string& obj) {
     const TemporaryFolder folder;
@@ -54,7 +54,7 @@ void expect_sound(const Scene& scene) {
 }
 
 TEST(ObjLoader, ReadsTrianglesInTheirOrderAndWinding) {
-    const Scene scene = load_text(square + "f 1 2 3\nf 1 3 4\n");
+    const Scene scene = load_text(square_corners + "f 1 2 3\nf 1 3 4\n");
     expect_sound(scene);
     EXPECT_EQ(scene.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
     EXPECT_EQ(scene.positions[2], Vec3(1, 1, 0));
@@ -81,20 +81,20 @@ TEST(ObjLoader, CutsConcavePolygonsInsideTheirOutline) {
 }
 
 TEST(ObjLoader, CountsNegativeIndicesFromTheLastVertex) {
-    const Scene scene = load_text(square + "f -4 -3 -2\nv 5 5 5\nf -5 -3 -2\n");
+    const Scene scene = load_text(square_corners + "f -4 -3 -2\nv 5 5 5\nf -5 -3 -2\n");
     expect_sound(scene);
     EXPECT_EQ(scene.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
     EXPECT_EQ(scene.positions.size(), 4u); // the stray vertex is left out
 }
 
 TEST(ObjLoader, AllowsFacesBeforeTheirVertices) {
-    const Scene scene = load_text("f 1 2 3\n" + square);
+    const Scene scene = load_text("f 1 2 3\n" + square_corners);
     expect_sound(scene);
     EXPECT_EQ(scene.triangles.size(), 1u);
 }
 
 TEST(ObjLoader, DropsFacesWithIndicesOutsideTheirList) {
-    const Scene scene = load_text(square
+    const Scene scene = load_text(square_corners
                                   + "f 1 2 3\nf 1 2 5\nf 0 1 2\nf -5 1 2\nf 1 2 2147483647\n"
                                     "f 1 2 -2147483648\nf 1 2 99999999999999999999\nf 1 2 x\n"
                                     "f 1 2 3 4 9\nf / // ///\nf\nf 1\nf 1 2\n");
@@ -108,7 +108,7 @@ TEST(ObjLoader, DropsFacesWithIndicesOutsideTheirList) {
 TEST(ObjLoader, DropsTrianglesWithCoordinatesThatAreNotFinite) {
     for (const char* odd : {"nan", "NaN", "-nan", "inf", "-inf", "infinity", "1e999", "-1e300",
                             "1.#IND", "1.#QNAN", "abc", "1e19"}) {
-        const Scene scene = load_text(square + "v 0 " + odd + " 0\nv 0 0 " + odd
+        const Scene scene = load_text(square_corners + "v 0 " + odd + " 0\nv 0 0 " + odd
                                       + "\nf 1 2 3\nf 1 2 5\nf 1 2 3 6\n");
         expect_sound(scene);
         EXPECT_EQ(scene.triangles.size(), 1u) << odd;
@@ -117,7 +117,7 @@ TEST(ObjLoader, DropsTrianglesWithCoordinatesThatAreNotFinite) {
 }
 
 TEST(ObjLoader, DropsTrianglesOfZeroArea) {
-    const Scene scene = load_text(square
+    const Scene scene = load_text(square_corners
                                   + "v 2 0 0\nv 0 0 0\nv 0.5 1e-20 0\n"
                                     "f 1 2 3\nf 1 1 2\nf 1 2 5\nf 1 6 2\nf 1 7 2\nf 3 3 3\n");
     expect_sound(scene);
@@ -140,7 +140,7 @@ TEST(ObjLoader, JudgesAreaByATrianglesOwnSize) {
 }
 
 TEST(ObjLoader, NormalisesNormalsAndGivesUpUnusableOnes) {
-    const Scene scene = load_text(square
+    const Scene scene = load_text(square_corners
                                   + "vn 0 0 5\nvn 0 3 4\nvn 0 0 0\nvn nan 0 1\nvn 1e30 0 0\n"
                                     "f 1//1 2//2 3//5\n" // fine
                                     "f 1//1 2//3 3//1\n" // zero
@@ -159,7 +159,7 @@ TEST(ObjLoader, NormalisesNormalsAndGivesUpUnusableOnes) {
 }
 
 TEST(ObjLoader, GivesUpUnusableTextureCoordinates) {
-    const Scene scene = load_text(square
+    const Scene scene = load_text(square_corners
                                   + "vt 0 0\nvt 1 0\nvt 1 1\nvt inf 0\n"
                                     "f 1/1 2/2 3/3\nf 1/1 2/2 3/4\nf 1/1 2/2 3/7\nf 1 2/2 3/3\n");
     expect_sound(scene);
@@ -256,7 +256,7 @@ TEST(ObjLoader, SurvivesRandomTextOfItsOwnWords) {
     int loaded = 0;
     for (std::uint64_t seed = 0; seed < 300; ++seed) {
         Rng rng(seed, 1);
-        std::string text = "mtllib x.mtl\n" + square + "vt 0 0\nvt 1 0\nvn 0 0 1\nvn 1 0 0\n";
+        std::string text = "mtllib x.mtl\n" + square_corners + "vt 0 0\nvt 1 0\nvn 0 0 1\nvn 1 0 0\n";
         for (int i = 0; i < 400; ++i)
             text += words[rng.next() % std::size(words)];
         try {
@@ -278,14 +278,14 @@ void write_picture(const std::string& path) {
 }
 
 const std::string textured_square =
-    square + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\n";
+    square_corners + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wall\nf 1/1 2/2 3/3 4/4\n";
 
 TEST(ObjMaterials, AreTakenLinearFromTheMtlFile) {
     const TemporaryFolder folder;
     folder.write("a.mtl",
                  "newmtl unused\nKd 0 0 0\nmap_Kd none.png\nnewmtl wall\nKd 0.2 0.4 0.6\n");
     const Scene scene =
-        load_obj(folder.write("a.obj", "mtllib a.mtl\n" + square + "usemtl wall\nf 1 2 3\n"));
+        load_obj(folder.write("a.obj", "mtllib a.mtl\n" + square_corners + "usemtl wall\nf 1 2 3\n"));
     expect_sound(scene);
     ASSERT_EQ(scene.materials.size(), 1u); // only what is used
     EXPECT_EQ(scene.materials[0].name, "wall");
@@ -297,7 +297,7 @@ TEST(ObjMaterials, AreClampedAndCounted) {
     const TemporaryFolder folder;
     folder.write("a.mtl", "newmtl a\nKd 1 1 1\nnewmtl b\nKd -1 0.5 7\nnewmtl c\nKd 0.9 0.9 0.9\n");
     const Scene scene = load_obj(
-        folder.write("a.obj", "mtllib a.mtl\n" + square
+        folder.write("a.obj", "mtllib a.mtl\n" + square_corners
                                   + "usemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl c\nf 1 2 3\n"));
     expect_sound(scene);
     EXPECT_TRUE((scene.materials[0].reflectance == 0.999f).all());
@@ -311,14 +311,14 @@ TEST(ObjMaterials, AreGreyWhereTheMtlFileOrTheNameIsMissing) {
     std::filesystem::create_directory(folder.path("folder.mtl"));
     for (const char* mtl : {"none.mtl", "folder.mtl", "."}) {
         const Scene scene = load_obj(folder.write(
-            "a.obj", std::string("mtllib ") + mtl + "\n" + square + "usemtl wall\nf 1 2 3\n"));
+            "a.obj", std::string("mtllib ") + mtl + "\n" + square_corners + "usemtl wall\nf 1 2 3\n"));
         expect_sound(scene);
         EXPECT_TRUE((scene.materials[0].reflectance == 0.5f).all());
         EXPECT_EQ(scene.summary.missing_files.size(), 1u);
         EXPECT_EQ(scene.summary.default_material, 1u);
     }
     const Scene scene = load_obj(folder.write(
-        "a.obj", "mtllib a.mtl\n" + square + "usemtl other\nf 1 2 3\nusemtl wall\nf 1 2 3\n"));
+        "a.obj", "mtllib a.mtl\n" + square_corners + "usemtl other\nf 1 2 3\nusemtl wall\nf 1 2 3\n"));
     expect_sound(scene);
     EXPECT_EQ(scene.summary.default_material, 1u);
     EXPECT_EQ(scene.materials.size(), 2u);
@@ -340,7 +340,7 @@ TEST(ObjMaterials, AreFoundWhateverBlanksAndSlashesTheNamesHold) {
                  "newmtl my wall  \nKd 0.2 0.4 0.6\nmap_Kd .\\the picture.png \n");
     write_picture(folder.path("sub/the picture.png"));
     const Scene scene =
-        load_obj(folder.write("a.obj", "mtllib sub\\my scene.mtl\r\n" + square
+        load_obj(folder.write("a.obj", "mtllib sub\\my scene.mtl\r\n" + square_corners
                                            + "vt 0 0\nusemtl my wall \r\nf 1/1 2/1 3/1\r\n"));
     expect_sound(scene);
     EXPECT_EQ(scene.summary.line(), "1 faces, 1 triangles");

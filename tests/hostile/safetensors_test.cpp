@@ -12,7 +12,7 @@ namespace afterglow {
 namespace {
 
 /// A small file with two tensors and the padding between them.
-std::string small_file() {
+std::string small_container() {
     const TemporaryFolder folder;
     const std::vector<float> position = {1.0f, 2.0f, 3.0f};
     const std::vector<std::uint16_t> index = {4, 5};
@@ -50,7 +50,7 @@ std::string entry(const std::string& name, const std::string& dtype, const std::
 
 TEST(HostileSafetensors, EveryTruncationIsAnError) {
     const TemporaryFolder folder;
-    const std::string good = small_file();
+    const std::string good = small_container();
     ASSERT_EQ(open(folder, good), "accepted");
     for (std::size_t length = 0; length < good.size(); ++length)
         EXPECT_NE(open(folder, good.substr(0, length)), "accepted") << length << " bytes";
@@ -59,12 +59,12 @@ TEST(HostileSafetensors, EveryTruncationIsAnError) {
 TEST(HostileSafetensors, AnythingAppendedIsAnError) {
     const TemporaryFolder folder;
     for (const std::size_t count : {1u, 64u, 4096u})
-        EXPECT_NE(open(folder, small_file() + std::string(count, '\0')), "accepted");
+        EXPECT_NE(open(folder, small_container() + std::string(count, '\0')), "accepted");
 }
 
 TEST(HostileSafetensors, EverySingleFlippedBitIsAnError) {
     const TemporaryFolder folder;
-    const std::string good = small_file();
+    const std::string good = small_container();
     for (std::size_t bit = 0; bit < 8 * good.size(); ++bit) {
         std::string bad = good;
         bad[bit / 8] = static_cast<char>(bad[bit / 8] ^ (1 << bit % 8));
@@ -135,7 +135,7 @@ TEST(HostileSafetensors, AbsurdSizesAreRefusedBeforeAnythingLargeIsAllocated) {
     std::string names;
     for (int i = 0; i < 50000; ++i)
         names += ",\"" + std::to_string(i) + "\":0";
-    std::string length_only = small_file();
+    std::string length_only = small_container();
     for (const std::uint64_t length :
          {std::uint64_t(1) << 20, std::uint64_t(1) << 40, ~std::uint64_t(0), ~std::uint64_t(7)}) {
         std::memcpy(length_only.data(), &length, sizeof(length));

@@ -18,8 +18,6 @@ namespace afterglow {
 namespace {
 
 constexpr int seeds = 6;
-const Vec3 eye_in_room(2.5f, 1.5f, 2.0f);
-
 Setting room(const Scene& scene = make_room()) {
     Setting setting{scene, room_lights(), {}};
     const Scene plain = make_room();

@@ -33,8 +33,6 @@ struct Prepared {
     }
 };
 
-const Vec3 eye_in_room(2.5f, 1.5f, 2.0f);
-
 /// The furnished room, made when it is first asked for.
 const Prepared& furnished() {
     static const Prepared room(make_room(), eye_in_room, 500);

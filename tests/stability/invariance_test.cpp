@@ -13,7 +13,7 @@ namespace {
 Setting room() {
     Setting setting{make_room(), room_lights(), {}};
     const Surface surface(setting.scene);
-    setting.places = points_in_sight(surface, Vec3(2.5f, 1.5f, 2.0f), 400, 5);
+    setting.places = points_in_sight(surface, eye_in_room, 400, 5);
     return setting;
 }
 

@@ -23,6 +23,9 @@ struct RoomShape {
 
 Scene make_room(const RoomShape& shape = {});
 
+/// Sees all of the room but what its furniture hides.
+inline const Vec3 eye_in_room(2.5f, 1.5f, 2.0f);
+
 /// A level square board of the given side, 1 cm thick, white, about `middle`.
 void add_board(Scene& room, const Vec3& middle, float side);
 

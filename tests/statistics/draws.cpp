@@ -14,12 +14,13 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 namespace afterglow {
 namespace {
 
-constexpr double pi = EIGEN_PI;
+using std::numbers::pi;
 
 /// Draw number k of a sampler whose seeds follow from `seed`: a cell.
 using CellOf = std::function<std::size_t(std::uint64_t k, std::uint64_t seed)>;

@@ -5,20 +5,21 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 namespace afterglow {
 namespace {
 
-constexpr double pi = EIGEN_PI;
+using std::numbers::pi;
 
 /// A closed box of two metres with reflectance 1/2 and senders on it.
-struct Example {
+struct LitFurnace {
     Scene scene = make_builtin_scene("builtin:furnace:0.5");
     Surface surface{scene};
     TransferOperator transfer;
     DirectLight direct{transfer.points, transfer.sender_levels - 1, transfer.sender_areas, surface};
 
-    explicit Example(float coarse_radius) : transfer(precompute(surface, options(coarse_radius))) {}
+    explicit LitFurnace(float coarse_radius) : transfer(precompute(surface, options(coarse_radius))) {}
 
     static PrecomputeOptions options(float coarse_radius) {
         PrecomputeOptions options;
@@ -45,14 +46,14 @@ struct Example {
     }
 };
 
-const Example& example() {
-    static const Example made(0.4f);
+const LitFurnace& example() {
+    static const LitFurnace made(0.4f);
     return made;
 }
 
 /// With senders half as far apart.
-const Example& finer_example() {
-    static const Example made(0.2f);
+const LitFurnace& finer_example() {
+    static const LitFurnace made(0.2f);
     return made;
 }
 

@@ -14,11 +14,11 @@ namespace afterglow {
 namespace {
 
 /// The Cornell box, its operator and indirect light.
-struct Example : SmallTransfer {
+struct PatchExample : SmallTransfer {
     ShepardBasis basis{transfer.points, surface, true, transfer.points.levels() - 1};
     VectorIrradiance field;
 
-    Example() : SmallTransfer{medium_options()} {
+    PatchExample() : SmallTransfer{medium_options()} {
         Spotlight light{.position = *scene.viewpoint, .direction = Vec3(0.3f, -0.5f, 1.0f)};
         light.check();
         field = LightTransport(transfer, surface).indirect(light);
@@ -26,8 +26,8 @@ struct Example : SmallTransfer {
     int level() const { return transfer.points.levels() - 1; }
 };
 
-const Example& cornell() {
-    static const Example example;
+const PatchExample& cornell() {
+    static const PatchExample example;
     return example;
 }
 
@@ -58,7 +58,7 @@ Camera cornell_camera(int width = 160, int height = 120) {
             .width = width, .height = height};
 }
 
-std::vector<PixelSurfaces::Float4> read(const Example& example, const Pixels& pixels,
+std::vector<PixelSurfaces::Float4> read(const PatchExample& example, const Pixels& pixels,
                                         const DisplayPatches& patches,
                                         const std::vector<std::uint32_t>& patch) {
     DisplayField field(example.transfer.points);
@@ -69,7 +69,7 @@ std::vector<PixelSurfaces::Float4> read(const Example& example, const Pixels& pi
 }
 
 /// Root mean square difference to Display over its mean; uncovered pixels must agree.
-double relative_error(const Example& example, const Pixels& pixels,
+double relative_error(const PatchExample& example, const Pixels& pixels,
                       const std::vector<PixelSurfaces::Float4>& result) {
     const Display display(example.transfer, example.surface);
     double squares = 0.0, mean = 0.0;

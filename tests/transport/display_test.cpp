@@ -12,19 +12,19 @@
 namespace afterglow {
 namespace {
 
-struct Example {
+struct DisplayExample {
     Scene scene;
     Surface surface;
     TransferOperator transfer;
 
-    explicit Example(const std::string& name)
+    explicit DisplayExample(const std::string& name)
         : scene(make_builtin_scene(name)), surface(scene),
           transfer(precompute(surface, medium_options())) {}
 };
 
 TEST(Display, CoversAllThatIsInSightAndIsNeverNegative) {
     for (const char* name : {"builtin:cornell", "builtin:furnace", "builtin:two_rooms"}) {
-        const Example example(name);
+        const DisplayExample example(name);
         const Display display(example.transfer, example.surface);
         Spotlight light{.position = *example.scene.viewpoint,
                         .direction = Vec3(0.3f, -0.5f, 1.0f),
@@ -50,7 +50,7 @@ TEST(Display, CoversAllThatIsInSightAndIsNeverNegative) {
 }
 
 TEST(Display, IsTheBasisTimesTheFieldDottedWithTheNormal) {
-    const Example example("builtin:cornell");
+    const DisplayExample example("builtin:cornell");
     const Display display(example.transfer, example.surface);
     const PointHierarchy& points = example.transfer.points;
     // A field that is (1, 2, 3) per colour in y, and nothing else: E = max(0, n_y) (1, 2, 3).
@@ -68,7 +68,7 @@ TEST(Display, IsTheBasisTimesTheFieldDottedWithTheNormal) {
 }
 
 TEST(Display, ReadsTheFinestLevelAlone) {
-    const Example example("builtin:cornell");
+    const DisplayExample example("builtin:cornell");
     const Display display(example.transfer, example.surface);
     const PointHierarchy& points = example.transfer.points;
     VectorIrradiance field(9 * points.size(), 0.0f);
@@ -82,7 +82,7 @@ TEST(Display, ReadsTheFinestLevelAlone) {
 
 TEST(Display, IsBlackWhereNothingCovers) {
     // Seen from behind, the floor of a closed room has no functions.
-    const Example example("builtin:furnace");
+    const DisplayExample example("builtin:furnace");
     const Display display(example.transfer, example.surface);
     const VectorIrradiance field(9 * example.transfer.points.size(), 1.0f);
     bool covered = true;

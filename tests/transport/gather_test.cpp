@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <utility>
 #include <vector>
@@ -15,7 +16,7 @@
 namespace afterglow {
 namespace {
 
-constexpr double pi = EIGEN_PI;
+using std::numbers::pi;
 
 /// Receivers at given places; all that trace_gather() reads.
 PointHierarchy receivers_at(const std::vector<SurfacePoint>& places) {

@@ -6,13 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
 namespace afterglow {
 namespace {
 
-constexpr double pi = EIGEN_PI;
+using std::numbers::pi;
 
 Spotlight cone(float inner, float outer) {
     Spotlight light{

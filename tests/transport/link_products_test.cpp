@@ -10,7 +10,7 @@
 namespace afterglow {
 namespace {
 
-constexpr std::uint32_t senders = 30000;
+constexpr std::uint32_t sender_count = 30000;
 
 /// Rows of 0 to 40 links, some of them far apart; the last row ends with the array.
 Links random_rows() {
@@ -22,7 +22,7 @@ Links random_rows() {
         row.clear();
         const std::uint32_t farthest = i % 3 == 0 ? 5000 : 100;
         std::uint32_t sender = rng.next() % 300;
-        for (int k = 0; k < i % 41 && sender < senders; ++k) {
+        for (int k = 0; k < i % 41 && sender < sender_count; ++k) {
             const float x = rng.uniform(), y = rng.uniform(), z = rng.uniform();
             packer.append(sender, std::exp2(-20.0f * rng.uniform()) * LinkVector(x - 0.5f, y - 0.5f, z - 0.5f, 0.0f), row);
             sender += 1 + rng.next() % farthest;
@@ -36,7 +36,7 @@ Links random_rows() {
 TEST(LinkProducts, OfRowsAreSumsOverTheirLinks) {
     const Links links = random_rows();
     Rng rng(9, 0);
-    std::vector<float> coefficients(4 * senders);
+    std::vector<float> coefficients(4 * sender_count);
     for (float& c : coefficients) c = rng.uniform() - 0.3f;
     for (Index i = 0; i < links.rows(); ++i) {
         Eigen::Matrix<double, 4, 3> expected = Eigen::Matrix<double, 4, 3>::Zero();

@@ -15,7 +15,7 @@ namespace afterglow {
 namespace {
 
 /// A built-in scene with a small basis over it.
-struct Example {
+struct LinksExample {
     Scene scene;
     Surface surface;
     PointHierarchy points;
@@ -24,7 +24,7 @@ struct Example {
     PushOperator push;
     PullOperator pull;
 
-    Example(const std::string& name, float coarse_radius, int receiver_levels, int sender_levels_)
+    LinksExample(const std::string& name, float coarse_radius, int receiver_levels, int sender_levels_)
         : scene(make_builtin_scene(name)), surface(scene),
           points(make_points(surface, coarse_radius, receiver_levels)),
           sender_levels(sender_levels_), basis(points, surface, true),
@@ -129,7 +129,7 @@ private:
 TEST(Links, AreThePlainGatherOfEachSender) {
     // The rows of the coarsest receivers, nothing dropped, from eight seeds, against plain Monte
     // Carlo: single senders and random fields. Patches so small that their size does not show.
-    const Example example("builtin:cornell", 0.25f, 1, 1);
+    const LinksExample example("builtin:cornell", 0.25f, 1, 1);
     const std::uint32_t senders = example.senders();
     ASSERT_GT(senders, 20u);
     const Footprint footprint{0.05f, example.points.spacing[0], 1};
@@ -180,7 +180,7 @@ TEST(Links, AreThePlainGatherOfEachSender) {
 
 TEST(Links, OfEveryLevelAddUpToThePlainGather) {
     // Differenced, pushed and with three levels of senders, to smooth and rough sender values.
-    const Example example("builtin:cornell", 0.25f, 3, 2);
+    const LinksExample example("builtin:cornell", 0.25f, 3, 2);
     const Footprint footprint{0.2f, example.points.spacing[0], 2};
     const std::uint32_t senders = example.senders();
     Eigen::MatrixXd values(senders, 6);
@@ -228,7 +228,7 @@ TEST(Links, OfEveryLevelAddUpToThePlainGather) {
 
 TEST(Links, AnswerUniformLightExactlyWhateverTheThreshold) {
     // In a closed room whose senders all carry radiosity 1 the vector irradiance is n.
-    const Example example("builtin:two_rooms", 1.0f, 4, 3);
+    const LinksExample example("builtin:two_rooms", 1.0f, 4, 3);
     const Eigen::Matrix3Xd normals = example.points.normal.cast<double>();
     Eigen::Matrix3Xd unthresholded;
     for (const float threshold : {0.0f, 1e-3f, 4e-3f, 1.6e-2f}) {
@@ -256,7 +256,7 @@ TEST(Links, AnswerUniformLightExactlyWhateverTheThreshold) {
 }
 
 TEST(Links, BecomeFewerAndLessExactAsTheThresholdGrows) {
-    const Example example("builtin:cornell", 0.2f, 3, 2);
+    const LinksExample example("builtin:cornell", 0.2f, 3, 2);
     Eigen::VectorXd values(example.senders());
     for (Index j = 0; j < values.size(); ++j)
         values[j] = example.points.position(1, j) > 0.3f ? 1.0 : 0.2;
@@ -286,7 +286,7 @@ TEST(Links, BecomeFewerAndLessExactAsTheThresholdGrows) {
 }
 
 TEST(Links, KeepEveryCoarseSenderThatTheCoarsestReceiversSee) {
-    const Example example("builtin:furnace", 0.8f, 2, 2);
+    const LinksExample example("builtin:furnace", 0.8f, 2, 2);
     LinkOptions options;
     options.rays = 1024;
     options.threshold = 0.0f;
@@ -306,7 +306,7 @@ TEST(Links, KeepEveryCoarseSenderThatTheCoarsestReceiversSee) {
 }
 
 TEST(Links, HaveSortedRowsOfSenders) {
-    const Example example("builtin:cornell", 0.2f, 3, 2);
+    const LinksExample example("builtin:cornell", 0.2f, 3, 2);
     LinkOptions options;
     options.rays = 64;
     const Links links = example.links(options, 0.5f);
@@ -322,7 +322,7 @@ TEST(Links, HaveSortedRowsOfSenders) {
 }
 
 TEST(Links, DependOnTheSeedButNotOnThreads) {
-    const Example example("builtin:cornell", 0.2f, 3, 2);
+    const LinksExample example("builtin:cornell", 0.2f, 3, 2);
     const auto make = [&](int threads, std::uint64_t seed) {
         const ThreadLimit limit(threads);
         LinkOptions options;

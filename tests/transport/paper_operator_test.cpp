@@ -24,7 +24,7 @@ namespace afterglow {
 namespace {
 
 /// A built-in scene with a small hierarchy of the printed shape.
-struct Example {
+struct PaperExample {
     Scene scene;
     Surface surface;
     PointHierarchy points;
@@ -33,7 +33,7 @@ struct Example {
     Pyramid pyramid;
     PullOperator pull;
 
-    Example(const std::string& name, float coarse_radius, int receiver_levels, int sender_levels_)
+    PaperExample(const std::string& name, float coarse_radius, int receiver_levels, int sender_levels_)
         : scene(make_builtin_scene(name)), surface(scene),
           points(make_points(surface, coarse_radius, receiver_levels)),
           sender_levels(sender_levels_), basis(points, surface, false),
@@ -95,7 +95,7 @@ void add(DenseRow& to, const DenseRow& row, double scale) {
 }
 
 /// T' from links of which none were dropped: (17) the other way round.
-std::vector<DenseRow> raw_links(const Example& example, const RgbLinks& all) {
+std::vector<DenseRow> raw_links(const PaperExample& example, const RgbLinks& all) {
     std::vector<DenseRow> raw;
     for (std::uint32_t i = 0; i < example.points.size(); ++i) {
         raw.push_back(row_of(all, i));
@@ -108,7 +108,7 @@ std::vector<DenseRow> raw_links(const Example& example, const RgbLinks& all) {
 TEST(PaperLinks, AreTheIntegralOfWhatIsSeen) {
     // (16) by plain Monte Carlo with the basis by the formula, to random fields of the senders, at
     // receivers of all levels; eight seeds of the operator. Coloured walls.
-    const Example example("builtin:cornell", 0.25f, 3, 2);
+    const PaperExample example("builtin:cornell", 0.25f, 3, 2);
     Rng random(5, 0);
     std::vector<float> field(example.senders());
     for (float& value : field)
@@ -160,7 +160,7 @@ TEST(PaperLinks, AreTheIntegralOfWhatIsSeen) {
 }
 
 TEST(PaperLinks, AreRefinedAsFigureFiveSays) {
-    const Example example("builtin:cornell", 0.25f, 4, 2);
+    const PaperExample example("builtin:cornell", 0.25f, 4, 2);
     const std::vector<DenseRow> raw = raw_links(example, example.links(0.0f, 64));
     std::vector<std::set<std::uint32_t>> neighbours(example.senders());
     for (std::uint32_t k = 0; k < example.senders(); ++k)
@@ -230,7 +230,7 @@ TEST(PaperLinks, AreRefinedAsFigureFiveSays) {
 
 /// S e from the definitions: T to all receivers once, then what the sum of it says at the senders is
 /// dotted with their normals, pulled, analysed and sent to the coarsest receivers, again and again.
-std::vector<RgbLink> bounce_by_bounce(const Example& example, const RgbLinks& links,
+std::vector<RgbLink> bounce_by_bounce(const PaperExample& example, const RgbLinks& links,
                                       const std::vector<float>& coefficients, int bounces) {
     const PointHierarchy& points = example.points;
     std::vector<float> e = coefficients;
@@ -259,7 +259,7 @@ std::vector<RgbLink> bounce_by_bounce(const Example& example, const RgbLinks& li
 }
 
 TEST(PaperSeries, IsSeveralBouncesOneByOne) {
-    const Example example("builtin:cornell", 0.25f, 3, 2);
+    const PaperExample example("builtin:cornell", 0.25f, 3, 2);
     const RgbLinks links = example.links(0.001f, 128);
     Rng random(9, 0);
     std::vector<float> e(3 * example.senders());
@@ -283,7 +283,7 @@ TEST(PaperSeries, IsSeveralBouncesOneByOne) {
 }
 
 TEST(PaperSeries, TruncatesWhatIsBelowTheThreshold) {
-    const Example example("builtin:cornell", 0.25f, 2, 2);
+    const PaperExample example("builtin:cornell", 0.25f, 2, 2);
     const RgbLinks links = example.links(0.001f, 128);
     const RgbLinks exact =
         make_paper_series(links, example.basis, 2, example.pyramid, example.pull, 2, 0.0f);
@@ -301,7 +301,7 @@ TEST(PaperSeries, TruncatesWhatIsBelowTheThreshold) {
     EXPECT_LT(cut.entries(), exact.entries());
 }
 
-PrecomputeOptions quick() {
+PrecomputeOptions quick_paper() {
     PrecomputeOptions options = PrecomputeOptions::paper();
     options.receiver_levels = 4;
     options.links.rays = 128;
@@ -322,7 +322,7 @@ TEST(PaperOperator, FillsAClosedRoomWithAsManyBouncesAsItHas) {
     light.check();
     const std::vector<SurfacePoint> places = points_by_area(scene, 5'000, 3);
     for (const int bounces : {1, 4}) {
-        PrecomputeOptions options = quick();
+        PrecomputeOptions options = quick_paper();
         options.bounces = bounces;
         options.links.threshold = 1e-4f;
         const TransferOperator transfer = precompute(surface, options);
@@ -348,7 +348,7 @@ TEST(PaperOperator, LosesLightToItsThreshold) {
     const Surface surface(scene);
     const Spotlight light{Vec3(0.278f, 0.5f, 0.2795f), -Vec3::UnitY(), 20.0f, 50.0f, Rgb(1, 1, 1)};
     const auto mean = [&](float threshold) {
-        PrecomputeOptions options = quick();
+        PrecomputeOptions options = quick_paper();
         options.links.threshold = threshold;
         const TransferOperator transfer = precompute(surface, options);
         const Display display(transfer, surface);
@@ -370,7 +370,7 @@ TEST(PaperOperator, IsTheSameOnAnyNumberOfThreads) {
     const Surface surface(scene);
     const auto make = [&](int threads) {
         const ThreadLimit limit(threads);
-        return precompute(surface, quick());
+        return precompute(surface, quick_paper());
     };
     const TransferOperator one = make(1), two = make(2);
     EXPECT_TRUE(std::ranges::equal(one.solution.index.span(), two.solution.index.span()));
@@ -383,7 +383,7 @@ TEST(PaperOperator, RefusesImpossibleOptions) {
     const Scene scene = make_builtin_scene("builtin:furnace");
     const Surface surface(scene);
     const auto expect_refusal = [&](auto&& change) {
-        PrecomputeOptions options = quick();
+        PrecomputeOptions options = quick_paper();
         change(options);
         EXPECT_THROW(precompute(surface, options), UsageError);
     };

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -15,34 +16,7 @@
 namespace afterglow {
 namespace {
 
-constexpr double pi = EIGEN_PI;
-
-/// Points uniform over a scene's area, on the side of the triangles' winding.
-std::vector<SurfacePoint> points_by_area(const Scene& scene, int count, std::uint64_t seed) {
-    std::vector<double> area_below;
-    double total = 0.0;
-    const auto corner = [&](std::size_t t, int c) {
-        return scene.positions[scene.triangles[t][c]];
-    };
-    const auto cross = [&](std::size_t t) -> Vec3 {
-        return (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0));
-    };
-    for (std::size_t t = 0; t < scene.triangles.size(); ++t)
-        area_below.push_back(total += cross(t).norm());
-    std::vector<SurfacePoint> points;
-    for (int i = 0; i < count; ++i) {
-        Rng rng(seed, static_cast<std::uint64_t>(i));
-        const double chosen = total * (i + rng.uniform()) / count;
-        const auto t = static_cast<std::size_t>(
-            std::upper_bound(area_below.begin(), area_below.end() - 1, chosen)
-            - area_below.begin());
-        const float s = std::sqrt(rng.uniform()), r = rng.uniform();
-        points.push_back({corner(t, 0) + s * (1.0f - r) * (corner(t, 1) - corner(t, 0))
-                              + s * r * (corner(t, 2) - corner(t, 0)),
-                          cross(t).normalized()});
-    }
-    return points;
-}
+using std::numbers::pi;
 
 struct MeanAndError {
     double mean = 0.0, error = 0.0;

@@ -15,13 +15,13 @@
 namespace afterglow {
 namespace {
 
-struct Example {
+struct RowsExample {
     Scene scene;
     Surface surface;
     PointHierarchy points;
     ShepardBasis basis;
 
-    explicit Example(const std::string& name, float coarse_radius)
+    explicit RowsExample(const std::string& name, float coarse_radius)
         : scene(make_builtin_scene(name)), surface(scene),
           points(make_points(surface, coarse_radius)), basis(points, surface, true) {}
 
@@ -65,7 +65,7 @@ bool equal(std::span<const BasisEntry> a, std::span<const BasisEntry> b) {
 }
 
 TEST(SenderRows, AreTheBasisAtTheCentresOfTheirPatches) {
-    const Example example("builtin:cornell", 0.2f);
+    const RowsExample example("builtin:cornell", 0.2f);
     SenderRows rows(example.surface, example.basis, 3, 0.25f);
     const std::vector<Hit> hits = hits_on_fronts(example.scene, 300, 2);
     rows.require(numbers_of(rows, hits));
@@ -205,7 +205,7 @@ TEST(SenderRows, KeepTheSidesOfAWallApart) {
 }
 
 TEST(SenderRows, AreTheSameInWhateverOrderTheyAreMade) {
-    const Example example("builtin:cornell", 0.2f);
+    const RowsExample example("builtin:cornell", 0.2f);
     SenderRows bit_by_bit(example.surface, example.basis, 3), at_once = bit_by_bit;
     std::vector<std::uint32_t> numbers = numbers_of(at_once, hits_on_fronts(example.scene, 50, 3));
     at_once.require(numbers);
@@ -225,7 +225,7 @@ TEST(SenderRows, AreTheSameInWhateverOrderTheyAreMade) {
 
 TEST(SenderRows, PullWithoutLosingLight) {
     // Sums over the rays that were counted: of what each level shows them, whatever is pulled.
-    const Example example("builtin:cornell", 0.2f);
+    const RowsExample example("builtin:cornell", 0.2f);
     constexpr int levels = 3;
     SenderRows rows(example.surface, example.basis, levels, 0.25f);
     const std::vector<Hit> hits = hits_on_fronts(example.scene, 20'000, 4);
@@ -257,7 +257,7 @@ TEST(SenderRows, PullWithoutLosingLight) {
 }
 
 TEST(SenderRows, PullConstantsToThemselves) {
-    const Example example("builtin:furnace", 0.5f);
+    const RowsExample example("builtin:furnace", 0.5f);
     SenderRows rows(example.surface, example.basis, 3);
     rows.see(hits_on_fronts(example.scene, 5'000, 4));
     const PullOperator pull = rows.make_pull_operator();
@@ -269,7 +269,7 @@ TEST(SenderRows, PullConstantsToThemselves) {
 }
 
 TEST(SenderRows, FinestAreasAddUpToTheSurface) {
-    const Example example("builtin:furnace", 0.5f);
+    const RowsExample example("builtin:furnace", 0.5f);
     SenderRows rows(example.surface, example.basis, 3);
     rows.require(numbers_of(rows, hits_on_fronts(example.scene, 20'000, 4)));
     const std::vector<float> areas = rows.finest_areas();
@@ -283,7 +283,7 @@ TEST(SenderRows, FinestAreasAddUpToTheSurface) {
 }
 
 TEST(SenderRows, LeaveFunctionsThatNoRayMetAsTheyAre) {
-    const Example example("builtin:furnace", 0.5f);
+    const RowsExample example("builtin:furnace", 0.5f);
     SenderRows rows(example.surface, example.basis, 2);
     EXPECT_EQ(rows.make_pull_operator().children.entries(), 0u);
 }

@@ -7,12 +7,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <string>
 
 namespace afterglow {
 namespace {
 
-constexpr double pi = EIGEN_PI;
+using std::numbers::pi;
 
 /// Small operators for what does not depend on accuracy.
 PrecomputeOptions quick(float coarse_radius) {
