@@ -18,8 +18,8 @@ namespace afterglow {
 ///     D_k = sum_j w_jk max(0, -E_j),   P_k = sum_j w_jk max(0, E_j),
 ///     E_j <- max(0, E_j) (1 - min(1, sum_k w_jk D_k / P_k)):
 ///
-/// sum_j w_jk E_j stays what it was for each parent k, unless it was below zero itself. V_j changes along
-/// n_j alone. `field`: nine numbers a point, as VectorIrradiance, in place. Costs next to nothing where
+/// sum_j E_j stays what it was, as sum_k w_jk = 1, but for what is missing where there is too little to
+/// take it from (the last sum above one). V_j changes along n_j alone. `field`: nine numbers a point, as VectorIrradiance, in place. Costs next to nothing where
 /// nothing is negative.
 void make_positive(const PointHierarchy& points, const PushOperator& push, VectorIrradiance& field);
 

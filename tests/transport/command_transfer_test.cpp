@@ -348,11 +348,13 @@ TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
 }
 
 TEST_F(CommandTransfer, ThePapersOperatorServesAllCommands) {
-    const std::string path = folder.path("t");
+    const std::string settings = " --coarse-radius 0.2 --receiver-levels 4 --sender-levels 3 --rays 256";
+    const std::string path = folder.path("t"), ours = folder.path("n");
     const Outcome made =
         run("precompute builtin:cornell --operator paper --epsilon 0.0005 -o" + quoted(path)
-            + " --report" + quoted(folder.path("r.json")) + small_settings);
+            + " --report" + quoted(folder.path("r.json")) + settings);
     ASSERT_EQ(made.status, 0) << made.err;
+    ASSERT_EQ(run("precompute builtin:cornell --quiet -o" + quoted(ours) + settings).status, 0);
     const std::string report = content_of(folder.path("r.json"));
     for (const char* part : {"\"operator\": \"paper\"", "\"bounces\": 4", "\"series\":"})
         EXPECT_NE(report.find(part), std::string::npos) << part;
@@ -360,7 +362,7 @@ TEST_F(CommandTransfer, ThePapersOperatorServesAllCommands) {
               std::string::npos);
 
     std::map<std::string, Image> picture;
-    for (const auto& [name, from] : {std::pair("paper", path), std::pair("neumann", file())}) {
+    for (const auto& [name, from] : {std::pair("paper", path), std::pair("neumann", ours)}) {
         const std::string image = folder.path(std::string(name) + ".exr");
         const Outcome rendered =
             run("render" + quoted(from) + " --layer indirect -o" + quoted(image) + light + camera);
@@ -372,8 +374,8 @@ TEST_F(CommandTransfer, ThePapersOperatorServesAllCommands) {
         paper += picture["paper"].rgb[k];
         neumann += picture["neumann"].rgb[k];
     }
-    // A few hundred points, four bounces.
-    EXPECT_NEAR(paper / neumann, 0.95, 0.15);
+    // Four bounces, and refinement that stops early. Twelve seeds: 0.944, standard deviation 0.016.
+    EXPECT_NEAR(paper / neumann, 0.944, 0.05);
 
     const std::string points = folder.write("p.csv", "0.1,0,0.1,0,1,0\n");
     ASSERT_EQ(run("query" + quoted(path) + " --points" + quoted(points) + " -o"
