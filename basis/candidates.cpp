@@ -104,23 +104,34 @@ std::vector<Vec3> find_viewpoints(const Surface& surface, std::uint64_t seed) {
 CandidateSource::CandidateSource(const Surface& surface, std::vector<Vec3> viewpoints,
                                  std::uint64_t seed)
     : surface_(surface), viewpoints_(std::move(viewpoints)), seed_(hash64(seed, 0x9a7c1e5)) {
+    if (surface.scene().triangles.size() >> 31) throw Error("the scene has more triangles than 2^31 - 1");
     ensure(1);
+}
+
+Candidate CandidateSource::operator[](std::size_t i) const {
+    const Place& place = places_[i];
+    Hit hit;
+    hit.primitive = place.primitive;
+    hit.back_side = place.back_side;
+    hit.u = place.u, hit.v = place.v;
+    return {surface_.point(hit), hit};
 }
 
 void CandidateSource::ensure(std::size_t count) {
     constexpr Index paths_at_once = 4096;
     struct Path {
-        std::vector<Candidate> left;
+        std::array<Place, most_bounces - skipped_bounces> left;
         double length_sum = 0.0;
-        std::uint32_t rays = 0, hits = 0;
+        std::uint32_t rays = 0, hits = 0; // those that leave a place
     };
-    for (int fruitless = 0; candidates_.size() < count;) {
-        std::vector<Path> paths(paths_at_once);
+    std::vector<Path> paths(paths_at_once);
+    for (int fruitless = 0; places_.size() < count;) {
         parallel_for(
             paths_at_once,
             [&](Index i) {
                 Path& path = paths[i];
-                path.left.reserve(most_bounces - skipped_bounces);
+                path.length_sum = 0.0;
+                path.rays = path.hits = 0;
                 const std::uint64_t id = next_path_ + static_cast<std::uint64_t>(i);
                 Rng rng(seed_, id);
                 Vec3 origin = viewpoints_[id % viewpoints_.size()];
@@ -131,9 +142,8 @@ void CandidateSource::ensure(std::size_t count) {
                     if (!hit) break;
                     const SurfacePoint x = surface_.point(hit);
                     if (bounce >= skipped_bounces) {
-                        path.left.push_back({x, hit});
+                        path.left[path.hits++] = {hit.primitive, hit.back_side, hit.u, hit.v};
                         path.length_sum += hit.distance;
-                        ++path.hits;
                     }
                     origin = surface_.lifted(x);
                     direction = Frame(x.normal).to_world(sample_cosine({rng.uniform(), rng.uniform()}));
@@ -141,14 +151,14 @@ void CandidateSource::ensure(std::size_t count) {
             },
             32);
         next_path_ += paths_at_once;
-        const std::size_t before = candidates_.size();
+        const std::size_t before = places_.size();
         for (const Path& path : paths) {
-            candidates_.insert(candidates_.end(), path.left.begin(), path.left.end());
+            places_.insert(places_.end(), path.left.begin(), path.left.begin() + path.hits);
             length_sum_ += path.length_sum;
             length_count_ += path.hits;
             rays_ += path.rays;
         }
-        if (candidates_.size() == before && ++fruitless > 8)
+        if (places_.size() == before && ++fruitless > 8)
             throw Error("no surface is reached from the viewpoint; name another with --viewpoint");
     }
 }

@@ -11,7 +11,7 @@ namespace afterglow {
 /// A place where a point of the basis may come to lie.
 struct Candidate {
     SurfacePoint at;
-    Hit hit;
+    Hit hit; // primitive, side and barycentric weights alone
 };
 
 /// Places in the open from which the scene can be looked at: the middle of its largest interior, and
@@ -21,17 +21,18 @@ std::vector<Vec3> find_viewpoints(const Surface& surface, std::uint64_t seed);
 
 /// Importance particles: paths from the viewpoints that reflect diffusely, thirty times at most, and
 /// leave a candidate at each bounce after the first three [LZT08, sec. 2.3]. So candidates lie where
-/// light that matters can come from, on the side that is looked at.
+/// light that matters can come from, on the side that is looked at. Twelve bytes each.
 class CandidateSource {
 public:
+    /// Throws Error where the scene has 2^31 triangles or more.
     CandidateSource(const Surface& surface, std::vector<Vec3> viewpoints, std::uint64_t seed);
 
     const Surface& surface() const { return surface_; }
     /// The i-th candidate of an endless sequence; makes more of it while `count` are not there.
     /// Not to be called concurrently. Throws Error where particles find no surface at all.
     void ensure(std::size_t count);
-    const Candidate& operator[](std::size_t i) const { return candidates_[i]; }
-    std::size_t size() const { return candidates_.size(); }
+    Candidate operator[](std::size_t i) const;
+    std::size_t size() const { return places_.size(); }
 
     /// Mean length of the particles' segments that end on a surface [world]: the typical distance
     /// over which light travels here.
@@ -45,7 +46,12 @@ private:
     std::uint64_t next_path_ = 0, rays_ = 0;
     double length_sum_ = 0.0;
     std::uint64_t length_count_ = 0;
-    std::vector<Candidate> candidates_;
+    /// What a candidate is made from again: there are tens of millions.
+    struct Place {
+        std::uint32_t primitive : 31, back_side : 1;
+        float u, v;
+    };
+    std::vector<Place> places_;
 };
 
 } // namespace afterglow

@@ -26,6 +26,10 @@ struct Cell {
     std::vector<DartOpenness> openness;     // one a dart
     std::vector<std::size_t> candidate;     // likewise
     std::vector<std::uint32_t> waiting;     // candidates of this round, by place in the round
+    std::uint32_t in_vain = 0;              // candidates since the last dart whose feature was asked for
+
+    /// Whether openness adds no more darts closer than R here.
+    bool is_settled() const { return in_vain >= 24; }
 };
 
 /// The cells around a cell, those first that are closest to the points of one eighth of it: there a
@@ -105,7 +109,9 @@ public:
         const std::size_t count = round.size();
         accepted.assign(count, 0);
         std::vector<Feature> features(refining ? count : 0);
-        const auto feature_of = [&](std::size_t i) { return refining ? &features[i] : nullptr; };
+        const auto feature_of = [&](std::size_t i, const Cell& cell) {
+            return refining && !cell.is_settled() ? &features[i] : nullptr;
+        };
         // Most conflict with darts of earlier rounds already, in whatever order they are looked at: one
         // beside the other, so that what is around is in the cache.
         std::vector<char> fits_so_far(count);
@@ -136,7 +142,7 @@ public:
             for (Index k = begin; k < end; ++k) {
                 const std::size_t i = candidate(k);
                 const std::int32_t id = cell[k - begin];
-                fits_so_far[i] = id < 0 || fits(cells_[id], round[i].at, feature_of(i));
+                fits_so_far[i] = id < 0 || fits(cells_[id], round[i].at, feature_of(i, cells_[id]));
             }
         });
         std::array<std::vector<std::int32_t>, 8> classes;
@@ -153,10 +159,15 @@ public:
                 [&](Index c) {
                     Cell& cell = cells_[same_parity[c]];
                     for (const std::uint32_t i : cell.waiting)
-                        accepted[i] = try_dart(cell, round[i].at, first + i, feature_of(i));
+                        accepted[i] = try_dart(cell, round[i].at, first + i, feature_of(i, cell));
                     cell.waiting.clear();
                 },
                 16);
+        for (std::size_t i = 0; i < features.size(); ++i)
+            if (features[i].first_half) {
+                Cell& cell = cells_[cell_of(round[i].at.position)];
+                cell.in_vain = accepted[i] ? 0 : cell.in_vain + 1;
+            }
     }
 
     /// Candidates for the holes around a dart at x: places along its tangent plane a little more than R away.
@@ -377,12 +388,16 @@ PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& opti
     };
     // Rounds stay small against what is there already, so that the order of cells leaves no pattern.
     const auto throw_candidates = [&](int per_point, bool refining) {
+        std::vector<Candidate> round;
         for (bool done = false; !done;) {
-            const std::size_t round = std::max<std::size_t>(2048, disk.points.size() / 2);
-            source.ensure(disk.candidates_tried + round);
-            const std::size_t fitted = throw_darts({&source[disk.candidates_tried], round}, refining);
-            done = static_cast<std::size_t>(per_point) * fitted < round;
-            disk.candidates_tried += round;
+            round.resize(std::max<std::size_t>(2048, disk.points.size() / 2));
+            source.ensure(disk.candidates_tried + round.size());
+            parallel_for(
+                static_cast<Index>(round.size()),
+                [&](Index i) { round[i] = source[disk.candidates_tried + i]; }, 1024);
+            const std::size_t fitted = throw_darts(round, refining);
+            done = static_cast<std::size_t>(per_point) * fitted < round.size();
+            disk.candidates_tried += round.size();
         }
     };
     throw_candidates(options.candidates_per_point, by_openness);
