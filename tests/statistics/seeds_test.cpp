@@ -27,7 +27,7 @@ struct Strategies {
 void PrintTo(const Strategies& compared, std::ostream* out) {
     *out << compared.name;
 }
-constexpr Strategies compared[] = {
+constexpr Strategies strategies_compared[] = {
     {"PlainPaths", PathStrategy::plain, PathStrategy::plain},
     {"ConnectedPaths", PathStrategy::connected, PathStrategy::connected},
     {"PlainAndConnectedPaths", PathStrategy::plain, PathStrategy::connected}};
@@ -66,7 +66,7 @@ std::vector<double> means_of_seeds(const PictureSetting& setting, PathStrategy s
 
 class Seeds : public testing::TestWithParam<std::tuple<PictureSetting, Strategies>> {
 protected:
-    double level = sidak_level(family_level, picture_settings().size() * std::size(compared));
+    double level = sidak_level(family_level, picture_settings().size() * std::size(strategies_compared));
 
     static double p_value(Fault fault) {
         const auto& [setting, compared] = GetParam();
@@ -91,7 +91,7 @@ TEST_P(Seeds, AreRejectedWithBrighterWalls) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Of, Seeds, testing::Combine(testing::ValuesIn(picture_settings()), testing::ValuesIn(compared)),
+    Of, Seeds, testing::Combine(testing::ValuesIn(picture_settings()), testing::ValuesIn(strategies_compared)),
     [](const auto& compared) {
         return std::get<0>(compared.param).name + "_" + std::get<1>(compared.param).name;
     });

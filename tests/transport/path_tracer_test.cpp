@@ -2,6 +2,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
+#include "tests/support/surface_samples.h"
 #include "transport/path_tracer.h"
 
 #include <gtest/gtest.h>

@@ -56,6 +56,8 @@ TEST(MakePositive, LeavesNothingBelowZeroAndAllTheLightThatThereIs) {
         not_there += (light * (taken - 1.0).max(0.0)).sum();
     }
     EXPECT_GT(raised, 50);
+    for (Index k = 0; k < there.cols(); ++k)
+        not_there += (there.col(k) > 0.0).select(Eigen::Array3d::Zero(), missing.col(k)).sum();
     // No light is made but what is missing where there is too little to take it from.
     EXPECT_NEAR(after, before + not_there, 1e-5 * before);
     EXPECT_LT(not_there, 1e-3 * before);
