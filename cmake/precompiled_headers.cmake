@@ -1,6 +1,6 @@
-# Most of the time that a file takes to compile, its headers take: those of libraries are parsed once for
-# many files. Not where files are compiled together anyway, and not in clang's preset, which sees whether
-# each file includes what it needs.
+# Most of the time that a file takes to compile, its headers take: where files are compiled one by one, those of
+# libraries are parsed once for many of them. Not in clang's preset, which sees whether each file includes what it
+# needs.
 option(AFTERGLOW_PRECOMPILED_HEADERS "Parse headers of libraries once: half the time to build" ON)
 
 # Of each variant: afterglow_headers, with CLI11 and JSON as well afterglow_program_headers; of tests
