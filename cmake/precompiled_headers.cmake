@@ -7,7 +7,7 @@ option(AFTERGLOW_PRECOMPILED_HEADERS "Parse headers of libraries once: half the 
 # afterglow_test_headers. Targets that take them have the same flags and at least the same definitions.
 function(afterglow_add_headers name)
     cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "LIBRARIES;HEADERS")
-    if(NOT AFTERGLOW_PRECOMPILED_HEADERS)
+    if(CMAKE_UNITY_BUILD OR NOT AFTERGLOW_PRECOMPILED_HEADERS)
         return()
     endif()
     set(empty ${CMAKE_BINARY_DIR}/generated/empty.cpp)

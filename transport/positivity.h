@@ -19,8 +19,8 @@ namespace afterglow {
 ///     E_j <- max(0, E_j) (1 - min(1, sum_k w_jk D_k / P_k)):
 ///
 /// sum_j E_j stays what it was, as sum_k w_jk = 1, but for what is missing where there is too little to
-/// take it from (the last sum above one). V_j changes along n_j alone. `field`: nine numbers a point, as VectorIrradiance, in place. Costs next to nothing where
-/// nothing is negative.
+/// take it from (the last sum above one, or P_k zero). V_j changes along n_j alone. `field`: nine numbers a
+/// point, as VectorIrradiance, in place. Costs next to nothing where nothing is negative.
 void make_positive(const PointHierarchy& points, const PushOperator& push, VectorIrradiance& field);
 
 /// The same for one hierarchy again and again, where it is known already which points of the display level
