@@ -38,8 +38,9 @@ struct PoissonDisk {
 /// Cells of size R, in eight classes whose members cannot conflict, are filled in parallel; the
 /// result does not depend on the number of threads. D is never below the Euclidean distance, so the
 /// 27 cells around a candidate decide. Where a density is asked, a cell adds no points closer than R once 24
-/// candidates in a row had their feature estimated there in vain. Holes are found around the darts, not by more candidates, so also where
-/// few of them come; but not beyond the last darts, unless a quarter of what is seen from there is empty.
+/// candidates in a row had their feature estimated there in vain. Holes are found around the darts, not by
+/// more candidates, so also where few of them come; but not beyond the last darts, unless a quarter of what is
+/// seen from there is empty.
 PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options);
 
 } // namespace afterglow
