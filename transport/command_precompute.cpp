@@ -36,7 +36,6 @@ using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 constexpr float draft_scale = 3.0f;
-constexpr int draft_rays = 128;
 
 struct PrecomputeCommand {
     std::string scene, output, report, checkpoint, operator_name = "neumann";
@@ -382,7 +381,6 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
     options.links.target_error = command.target_error;
     if (command.draft) {
         options.coarse_scale = draft_scale;
-        if (!given("--rays")) options.links.rays = draft_rays;
         command.no_verification = true;
     }
     options.links.rays = std::max(16, static_cast<int>(std::bit_ceil(
@@ -430,7 +428,8 @@ void add_precompute_command(CLI::App& app) {
                     "Levels of senders, spaced alike (default 5; of --operator paper 3)");
     sub->add_option("--rays", command->options.links.rays,
                     "Gather rays of a receiver, made a power of two (default 512): more on coarser levels, on "
-                    "the finest no more than its thresholds need")
+                    "the finest no more than its thresholds need, fewer where --target-error or --draft takes "
+                    "a wider spacing than usual")
         ->check(CLI::Range(1, 32768));
     sub->add_option("--bounces", command->options.bounces,
                     "Bounces of indirect light (default 0: all; of --operator paper 4)")

@@ -34,7 +34,7 @@ struct ErrorParts {
 /// How closely it looks: at so many of the places, with so many rays at each and at its display point.
 struct ErrorPartsOptions {
     int places = 250;
-    int rays = 512; // even
+    int rays = 256; // even
 };
 
 /// Of an operator that is not the paper's, under a trial that is not empty with its reference. A ray takes

@@ -62,6 +62,16 @@ HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSo
     return hierarchy;
 }
 
+/// Of a receiver, as PrecomputeOptions::coarse_scale has it.
+int rays_at_scale(const PrecomputeOptions& options) {
+    constexpr int fewest = 128;
+    const int rays = options.links.rays;
+    if (options.coarse_radius > 0.0f || options.coarse_scale <= 1.0f) return rays;
+    const double wanted = rays * std::pow(options.coarse_scale, -1.5);
+    const int nearest = 1 << static_cast<int>(std::log2(wanted) + 0.49); // in the middle: the lower
+    return std::max(nearest, std::min(rays, fewest));
+}
+
 /// Goes on from `begun` where that is given: then of `transfer`, all but the links is there.
 void make_neumann(const Surface& surface, const LinkOptions& links, Checkpoint* checkpoint,
                   const Checkpoint::State* begun, TransferOperator& transfer, PrecomputeReport& report) {
@@ -179,6 +189,7 @@ TransferOperator precompute(const Surface& surface, const PrecomputeOptions& opt
 
     LinkOptions links = options.links;
     links.seed = options.seed;
+    links.rays = rays_at_scale(options);
     if (options.progress)
         links.progress = [&](double share) {
             options.progress(std::lerp(points_share + push_share, 1.0, share));

@@ -18,7 +18,10 @@ struct PrecomputeOptions {
     std::optional<Vec3> viewpoint; // where the scene is looked at from; found by itself otherwise
     float coarse_radius = 0.0f; // R of the coarsest level [world]; 0: from the typical ray length and how many
                                 // points it takes
-    float coarse_scale = 1.0f; // of the radius that is found by itself
+    /// Of the radius that is found by itself. Above 1, receivers cast coarse_scale^-1.5 times as many rays
+    /// as LinkOptions says, to the nearest power of two, but at least 128: with wider functions more rays
+    /// show no smaller error (docs/performance.md).
+    float coarse_scale = 1.0f;
     /// Levels of receivers, spacing R, R/2, R/4 ...; the last is the display level.
     int receiver_levels = 6;
     /// Levels of senders, spaced alike; they share the points of the receivers' levels but the

@@ -15,8 +15,8 @@ namespace {
 constexpr float first_scale = 4.0f, finest_scale = 0.25f;
 constexpr int most_steps = 5;
 // Shares of the target, as errors are known to a tenth: what a step aims at, the second lower as it is far from the
-// first, what is good enough, and what fresh lights may say.
-constexpr double far_aim = 0.65, aim = 0.8, safely = 0.9, allowed = 1.2;
+// first, and what fresh lights may say.
+constexpr double far_aim = 0.65, aim = 0.8, allowed = 1.2;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
 
@@ -26,7 +26,7 @@ constexpr double largest_step = 0.2, smallest_step = 0.75;
 
 /// Rays that a comparison with the path tracer may take.
 std::uint64_t verification_rays(const PrecomputeReport& report) {
-    return std::max<std::uint64_t>(4'000'000, (report.links.rays + report.points_rays) / 5);
+    return std::max<std::uint64_t>(3'000'000, (report.links.rays + report.points_rays) / 10);
 }
 
 /// The order of the error as the last two steps show it.
@@ -91,7 +91,7 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
             continue;
         }
         double error = last.error.certain;
-        if (error <= safely * tuning.target_error) {
+        if (error <= tuning.target_error) {
             judge(last);
             if (last.judged->rel_rmse <= allowed * tuning.target_error) break;
             error = last.judged->certain;

@@ -62,6 +62,27 @@ TEST(Precompute, MakesWhatItsOptionsSay) {
     EXPECT_GT(report.total_seconds, 0.0);
 }
 
+// As if the wider spacing had been asked for by itself, with fewer rays.
+TEST(Precompute, WiderFunctionsCastFewerRays) {
+    const Scene scene = make_builtin_scene("builtin:cornell");
+    const Surface surface(scene);
+    const auto expect_rays = [&](float coarse_scale, int rays, int cast) {
+        PrecomputeOptions options = small_options();
+        options.coarse_radius = 0.0f;
+        options.coarse_scale = coarse_scale;
+        options.links.rays = rays;
+        const TransferOperator scaled = precompute(surface, options);
+        options.coarse_radius = scaled.points.spacing[0]; // then the scale is not looked at
+        options.links.rays = cast;
+        EXPECT_TRUE(equal(scaled, precompute(surface, options))) << "spacing times " << coarse_scale;
+    };
+    expect_rays(4.0f, 512, 128);
+    expect_rays(4.0f, 2048, 256);
+    expect_rays(3.0f, 1024, 256);
+    expect_rays(4.0f, 64, 64);
+    expect_rays(1.2f, 128, 128);
+}
+
 TEST(Precompute, StaysInSightOfAGivenViewpoint) {
     const Scene scene = make_builtin_scene("builtin:two_rooms_closed");
     const Surface surface(scene);
