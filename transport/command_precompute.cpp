@@ -35,7 +35,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-constexpr float draft_scale = 3.0f;
+constexpr float draft_scale = 4.0f;
 
 struct PrecomputeCommand {
     std::string scene, output, report, checkpoint, operator_name = "neumann";

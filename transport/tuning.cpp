@@ -19,6 +19,7 @@ constexpr int most_steps = 5;
 constexpr double far_aim = 0.65, aim = 0.8, allowed = 1.2;
 constexpr double expected_order = 0.9; // of the error in the spacing
 constexpr double cost_order = 1.5; // of time and memory in 1 / spacing, at most, as seen in ten scenes
+constexpr double planned_share = 0.8; // of the time that is left: a step's is not known better, and it is judged
 
 /// Of spacings: where a single place decides, less may do than it seems; and a step that costs less than half as
 /// much again as the last is not worth it.
@@ -105,8 +106,9 @@ TransferOperator precompute_to_target(const Surface& surface, PrecomputeOptions 
         scale = std::max(scale, static_cast<double>(finest_scale));
         // As fine as the limits let it be, if that is worth a step.
         const double coarsest_worthwhile = smallest_step * last.coarse_scale;
-        const double of_time = last.coarse_scale
-                               * std::pow(last.seconds / std::max(1e-9, tuning.most_seconds - elapsed()), 1.0 / cost_order);
+        const double time_left = planned_share * (tuning.most_seconds - elapsed());
+        const double of_time =
+            last.coarse_scale * std::pow(last.seconds / std::max(1e-9, time_left), 1.0 / cost_order);
         const double of_memory =
             last.coarse_scale
             * std::pow(std::max(1.0, peak_memory() - memory_before) / std::max(1.0, tuning.most_bytes - memory_before),
