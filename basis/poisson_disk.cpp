@@ -15,6 +15,8 @@
 namespace afterglow {
 namespace {
 
+constexpr std::uint32_t settled_after = 24; // candidates in a row, whose rays found nothing to refine
+
 struct DartOpenness {
     Openness first_half, whole; // of OpennessProbe
 };
@@ -29,7 +31,7 @@ struct Cell {
     std::uint32_t in_vain = 0;              // candidates since the last dart whose feature was asked for
 
     /// Whether openness adds no more darts closer than R here.
-    bool is_settled() const { return in_vain >= 24; }
+    bool is_settled() const { return in_vain >= settled_after; }
 };
 
 /// The cells around a cell, those first that are closest to the points of one eighth of it: there a

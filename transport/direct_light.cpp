@@ -171,7 +171,7 @@ bool DirectLight::on_edge(std::span<const Lit> lit, std::size_t k) const {
 
 Rgb DirectLight::mean_irradiance(const Spotlight& light, const Falloff& falloff, Index k) const {
     constexpr std::size_t count = 8;
-    constexpr float share_of_spacing = 0.25f, lift_share = 0.0f;
+    constexpr float share_of_spacing = 0.25f;
     const Index j = points_.begin(level_) + k;
     const SurfacePoint x = points_.point(j);
     const float size = std::min(points_.spacing[level_], points_.support[j]);
@@ -186,8 +186,7 @@ Rgb DirectLight::mean_irradiance(const Spotlight& light, const Falloff& falloff,
     for (std::size_t s = 0; s < count; ++s) {
         const float radius = share_of_spacing * size * std::sqrt((s + 0.5f) / count);
         const float phi = 2.0f * static_cast<float>(EIGEN_PI) * (turn + golden_section * s);
-        place[s] = centre[s]
-                   + frame.to_world({radius * std::cos(phi), radius * std::sin(phi), lift_share * size});
+        place[s] = centre[s] + frame.to_world({radius * std::cos(phi), radius * std::sin(phi), 0.0f});
     }
     std::uint16_t apart = apart_[static_cast<std::size_t>(k)].load(std::memory_order_relaxed);
     if (apart == apart_unknown) {
