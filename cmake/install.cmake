@@ -5,8 +5,8 @@ include(CMakePackageConfigHelpers)
 # ---- programs, with pages and completion that they write themselves
 install(TARGETS afterglow afterglow-view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 if(AFTERGLOW_FAST_PROGRAMS)
-    install(TARGETS afterglow_fast afterglow-view_fast
-        RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR}/${fast_folder} COMPONENT programs)
+    cmake_path(SET fast_destination NORMALIZE ${CMAKE_INSTALL_BINDIR}/${fast_folder})
+    install(TARGETS afterglow_fast afterglow-view_fast RUNTIME DESTINATION ${fast_destination} COMPONENT programs)
 endif()
 
 find_program(GZIP gzip REQUIRED)
