@@ -195,7 +195,8 @@ std::string bumpy_room() {
 }
 
 TEST_P(OnContext, NormalMapsAreThoseOfTheRendererOnTheCpu) {
-    const TransferScene& scene = opened(bumpy_room());
+    const std::string room = bumpy_room();
+    const TransferScene& scene = opened(room);
     ASSERT_EQ(scene.scene.normal_maps.size(), 2u);
     const Camera camera{.position = {3.5f, 2.0f, 3.5f}, .target = {1.5f, 0.5f, 0.5f}, .vertical_fov = 60.0f, .width = 240, .height = 180};
     Spotlight light{.position = {2.0f, 2.5f, 2.5f}, .direction = {-0.2f, -1.0f, -0.5f}, .inner_angle = 30.0f, .outer_angle = 50.0f};
@@ -308,7 +309,8 @@ TEST(Renderer, SponzaFromSplatGatherAndCpuIsOnePicture) {
     const std::string sponza = "../shared/scenes/sponza/sponza.obj";
     const std::filesystem::path root = std::filesystem::path(AFTERGLOW_TESTS).parent_path();
     if (!std::filesystem::exists(root / sponza)) GTEST_SKIP() << "no " << sponza;
-    const TransferScene& scene = opened((root / sponza).string());
+    const std::string path = (root / sponza).string();
+    const TransferScene& scene = opened(path);
     const auto context = make_offscreen_context("egl");
     Spotlight light{.position = {0.0f, 9.0f, 0.0f}, .direction = {-0.2f, -1.0f, 0.1f}, .inner_angle = 32.0f, .outer_angle = 40.0f};
     light.check();
