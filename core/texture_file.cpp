@@ -13,8 +13,9 @@
 #include <string_view>
 
 // Built here rather than taken from the shared library: the readers of other formats follow null pointers
-// or read behind their buffers where a file is damaged, and that of JPEG uses tables which the file never
-// filled. Of zeros, the same file gives the same picture.
+// or read behind their buffers where a file is damaged, and those that are read use tables which the file never
+// filled, of colours and codes. Of zeros, the same file gives the same picture; on the stack the compiler makes
+// them (CMakeLists.txt).
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_BMP
@@ -36,6 +37,7 @@ constexpr std::uint64_t most_texels = std::uint64_t{1} << 26;
 constexpr std::size_t most_bytes = 999'999'999; // stb_image counts them as int
 constexpr std::string_view png = "\x89PNG";
 constexpr std::size_t png_signature = 8;
+constexpr std::string_view bmp = "BM";
 constexpr std::string_view jpeg = "\xff\xd8", filled_jpeg = "\xff\xff"; // stb_image would read both
 
 float linear_from_srgb(int byte) {
@@ -108,6 +110,22 @@ bool has_sound_jpeg_tables(std::string_view file) {
     return true;
 }
 
+/// False where a BMP file of few colours has no table of them.
+bool has_colour_table(std::string_view file) {
+    constexpr std::size_t offset_at = 10, header_at = 14, old_depth_at = 24, depth_at = 28;
+    constexpr std::uint64_t old_header = 12;
+    const auto number = [&](std::size_t at, std::size_t bytes) {
+        std::uint64_t n = 0;
+        for (std::size_t k = bytes; k-- > 0;)
+            n = n << 8 | (at + k < file.size() ? static_cast<unsigned char>(file[at + k]) : 0u);
+        return n;
+    };
+    const std::uint64_t header = number(header_at, 4);
+    const bool old = header == old_header;
+    const std::uint64_t depth = number(old ? old_depth_at : depth_at, 2);
+    return depth >= 16 || number(offset_at, 4) > header_at + (old ? 2 : 1) * header; // as stb_image counts
+}
+
 /// A picture whose bytes stand for the numbers of a table. Throws FileError where the file holds none
 /// that stb_image reads.
 Texture read_picture(const std::string& path, const std::array<float, 256>& value) {
@@ -115,7 +133,8 @@ Texture read_picture(const std::string& path, const std::array<float, 256>& valu
     const auto bytes = file.bytes();
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if ((text.starts_with(png) && !has_whole_chunks(text))
-        || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)) || text.starts_with(filled_jpeg))
+        || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)) || text.starts_with(filled_jpeg)
+        || (text.starts_with(bmp) && !has_colour_table(text)))
         throw FileError(path, "is damaged or cut short");
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
     const int size = bytes.size() <= most_bytes ? static_cast<int>(bytes.size()) : 0;
