@@ -16,10 +16,12 @@
 #include <filesystem>
 #include <fstream>
 #include <istream>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <set>
 #include <span>
+#include <sstream>
 #include <streambuf>
 #include <string_view>
 
@@ -172,6 +174,23 @@ bool is_file(const fs::path& path) {
     return fs::is_regular_file(path, ignored);
 }
 
+constexpr char blank_in_name = '\x1f';
+
+/// An MTL file, with that for blanks in names of materials, which some versions of tinyobjloader end there.
+std::string with_names_in_one_word(std::istream& file) {
+    constexpr std::string_view keyword = "newmtl ";
+    std::string text(std::istreambuf_iterator<char>(file), {});
+    for (std::size_t begin = 0, end; begin < text.size(); begin = end + 1) {
+        end = std::min(text.find_first_of("\r\n", begin), text.size());
+        const std::string_view line = trimmed(std::string_view(text).substr(begin, end - begin));
+        if (!line.starts_with(keyword)) continue;
+        const std::string_view name = trimmed(line.substr(keyword.size()));
+        char* first = text.data() + (name.data() - text.data());
+        std::replace(first, first + name.size(), ' ', blank_in_name);
+    }
+    return text;
+}
+
 /// Reads the MTL files that the OBJ file names.
 class MaterialFiles : public tinyobj::MaterialReader {
 public:
@@ -195,9 +214,14 @@ public:
         }
         note_if_outside(path.string(), folder_, summary_);
         const std::size_t known = materials->size();
-        tinyobj::LoadMtl(index, materials, &file, warnings, errors);
-        for (std::size_t i = known; i < materials->size(); ++i)
+        std::istringstream text(with_names_in_one_word(file));
+        tinyobj::LoadMtl(index, materials, &text, warnings, errors);
+        for (std::size_t i = known; i < materials->size(); ++i) {
+            std::string& name = (*materials)[i].name;
+            std::replace(name.begin(), name.end(), blank_in_name, ' ');
+            index->emplace(name, static_cast<int>(i));
             sources.push_back(convert((*materials)[i], path.parent_path()));
+        }
         return true;
     }
 

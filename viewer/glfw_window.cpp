@@ -5,6 +5,8 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <cstdlib>
+
 namespace afterglow {
 namespace {
 
@@ -27,6 +29,9 @@ bool control(GLFWwindow* w) { return is_held(w, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_
 } // namespace
 
 GlfwWindow::GlfwWindow(int width, int height, const std::string& title) {
+#ifdef GLFW_PLATFORM // GLFW 3.4 asks for Wayland first, which says a word of its own where nothing can be
+    if (!std::getenv("XDG_RUNTIME_DIR")) glfwInitHint(GLFW_PLATFORM, GLFW_PLATFORM_X11);
+#endif
     if (!glfwInit()) throw Error("no window: " + last_error() + "; give --headless, or set DISPLAY");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);

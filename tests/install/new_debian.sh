@@ -6,7 +6,9 @@
 work=$(mktemp -d)
 root=$work/debian
 cleanup() {
-    if mountpoint -q "$root/proc"; then umount "$root/proc"; fi
+    for folder in dev/pts dev/shm proc; do
+        if mountpoint -q "$root/$folder"; then umount "$root/$folder"; fi
+    done
     rm -rf --one-file-system "$work"
 }
 trap cleanup EXIT
@@ -21,5 +23,7 @@ new_debian() {
     cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/"
     cp /etc/resolv.conf "$root/etc/resolv.conf"
     mount -t proc proc "$root/proc"
+    mount -t devpts devpts "$root/dev/pts"
+    mount -t tmpfs tmpfs "$root/dev/shm"
 }
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root DEBIAN_FRONTEND=noninteractive "$@"; }
