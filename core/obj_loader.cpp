@@ -217,10 +217,10 @@ public:
         std::istringstream text(with_names_in_one_word(file));
         tinyobj::LoadMtl(index, materials, &text, warnings, errors);
         for (std::size_t i = known; i < materials->size(); ++i) {
-            std::string& name = (*materials)[i].name;
-            std::replace(name.begin(), name.end(), blank_in_name, ' ');
-            index->emplace(name, static_cast<int>(i));
-            sources.push_back(convert((*materials)[i], path.parent_path()));
+            tinyobj::material_t& read = (*materials)[i];
+            std::replace(read.name.begin(), read.name.end(), blank_in_name, ' ');
+            index->emplace(read.name, static_cast<int>(i));
+            sources.push_back(convert(read, path.parent_path()));
         }
         return true;
     }
