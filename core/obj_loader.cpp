@@ -178,13 +178,14 @@ constexpr char blank_in_name = '\x1f';
 
 /// An MTL file, with that for blanks in names of materials, which some versions of tinyobjloader end there.
 std::string with_names_in_one_word(std::istream& file) {
-    constexpr std::string_view keyword = "newmtl ";
+    constexpr std::string_view keyword = "newmtl";
     std::string text(std::istreambuf_iterator<char>(file), {});
     for (std::size_t begin = 0, end; begin < text.size(); begin = end + 1) {
         end = std::min(text.find_first_of("\r\n", begin), text.size());
         const std::string_view line = trimmed(std::string_view(text).substr(begin, end - begin));
         if (!line.starts_with(keyword)) continue;
-        const std::string_view name = trimmed(line.substr(keyword.size()));
+        const std::string_view rest = line.substr(keyword.size()), name = trimmed(rest);
+        if (name.size() == rest.size()) continue; // another word
         char* first = text.data() + (name.data() - text.data());
         std::replace(first, first + name.size(), ' ', blank_in_name);
     }
