@@ -1,5 +1,6 @@
 #include "core/error.h"
 #include "core/texture_file.h"
+#include "tests/support/number_bytes.h"
 #include "tests/support/temporary_folder.h"
 
 #include <gtest/gtest.h>
@@ -12,17 +13,6 @@ namespace afterglow {
 namespace {
 
 using namespace std::string_literals;
-
-std::string little_endian(std::uint32_t number) {
-    std::string bytes;
-    for (int k = 0; k < 4; ++k) bytes += static_cast<char>(number >> 8 * k);
-    return bytes;
-}
-
-std::string big_endian(std::uint32_t number) {
-    const std::string bytes = little_endian(number);
-    return {bytes.rbegin(), bytes.rend()};
-}
 
 /// A chunk of a PNG file; its check sum is not looked at.
 std::string chunk(const std::string& type, const std::string& content) {

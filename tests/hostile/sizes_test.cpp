@@ -2,6 +2,7 @@
 #include "core/obj_loader.h"
 #include "tests/support/allocation_watch.h"
 #include "tests/support/file_error.h"
+#include "tests/support/number_bytes.h"
 #include "tests/support/temporary_folder.h"
 #include "transport/csv_points.h"
 #include "transport/transfer_file.h"
@@ -16,18 +17,6 @@ namespace afterglow {
 namespace {
 
 constexpr std::size_t some_megabytes = std::size_t(4) << 20;
-
-std::string big_endian(std::uint32_t number) {
-    std::string bytes(4, '\0');
-    for (int i = 0; i < 4; ++i)
-        bytes[i] = static_cast<char>(number >> (24 - 8 * i));
-    return bytes;
-}
-
-std::string little_endian(std::uint32_t number) {
-    const std::string bytes = big_endian(number);
-    return {bytes.rbegin(), bytes.rend()};
-}
 
 /// A file of 200 bytes that starts like this.
 std::string padded(const std::string& start) {
