@@ -119,6 +119,7 @@ void MovingLight::push_levels(int levels, const Visit& visit) {
             const Eigen::Vector4f* const product = &product_[static_cast<std::size_t>(3 * (first + k))];
             const Padded v = with_prediction(first + k, product[0], product[1], product[2]);
             coarse_[static_cast<std::size_t>(first + k)] = v;
+            store(first + k, v);
             visit(first + k, v);
         }, 512);
     }
@@ -164,7 +165,6 @@ void MovingLight::push_display() {
                 (v[0].cwiseAbs2() + v[1].cwiseAbs2() + v[2].cwiseAbs2()).sum());
         }
     });
-    parallel_for(first, [&](Index i) { store(i, coarse_[static_cast<std::size_t>(i)]); }, 4096);
     double squares = 0.0;
     negative_.clear();
     for (const Chunk& chunk : chunks) {

@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -57,54 +58,51 @@ PositivityLimiter::PositivityLimiter(const PointHierarchy& points, const PushOpe
         const auto weight = push.parents.values(j);
         for (std::size_t e = 0; e < index.size(); ++e) child_[next[index[e] - first_parent_]++] = {j, weight[e]};
     }
-    slot_.assign(parents, none);
+    is_asked_.resize(parents);
+    share_.assign(parents, Rgb::Zero());
     changes_.resize(points.size() - first_point_);
 }
 
 void PositivityLimiter::operator()(std::span<const std::uint32_t> negative, VectorIrradiance& field) {
     DisplayPoints display{points_, field};
-    taken_.clear();
-    changed_.assign(negative.begin(), negative.end());
-    for (const std::uint32_t j : negative) {
-        changes_[j - first_point_] = 1;
-        for (const std::uint32_t parent : push_.parents.indices(j))
-            if (std::uint32_t& slot = slot_[parent - first_parent_]; slot == none) {
-                slot = static_cast<std::uint32_t>(taken_.size());
-                taken_.push_back({parent - first_parent_, Rgb::Zero()});
-            }
-    }
-    for (const Parent& parent : taken_)
-        for (std::uint32_t e = child_begin_[parent.id]; e < child_begin_[parent.id + 1]; ++e)
-            if (std::uint8_t& changes = changes_[child_[e].point - first_point_]; !changes) {
-                changes = 1;
-                changed_.push_back(child_[e].point);
-            }
+    const auto set = [](std::uint8_t& flag) { std::atomic_ref(flag).store(1, std::memory_order_relaxed); };
+    parallel_for(static_cast<Index>(negative.size()), [&](Index k) {
+        const std::uint32_t j = negative[static_cast<std::size_t>(k)];
+        set(changes_[j - first_point_]); // of those without parents, too
+        for (const std::uint32_t parent : push_.parents.indices(j)) set(is_asked_[parent - first_parent_]);
+    }, 1024);
     // What is missing below each parent, and what there is to take it from.
-    parallel_for(static_cast<Index>(taken_.size()), [&](Index k) {
-        Parent& parent = taken_[static_cast<std::size_t>(k)];
+    const auto parents = static_cast<Index>(is_asked_.size());
+    parallel_for(parents, [&](Index k) {
+        const auto parent = static_cast<std::size_t>(k);
+        if (!is_asked_[parent]) return;
         Rgb missing = Rgb::Zero(), there = Rgb::Zero();
-        for (std::uint32_t e = child_begin_[parent.id]; e < child_begin_[parent.id + 1]; ++e) {
+        for (std::uint32_t e = child_begin_[parent]; e < child_begin_[parent + 1]; ++e) {
+            set(changes_[child_[e].point - first_point_]);
             const Rgb irradiance = display.irradiance(child_[e].point);
             missing += child_[e].weight * (-irradiance).max(0.0f);
             there += child_[e].weight * irradiance.max(0.0f);
         }
-        parent.share = (there > 0.0f).select(missing / there.max(1e-30f), Rgb::Zero());
-    }, 64);
-    parallel_for(static_cast<Index>(changed_.size()), [&](Index k) {
-        const std::uint32_t j = changed_[static_cast<std::size_t>(k)];
+        share_[parent] = (there > 0.0f).select(missing / there.max(1e-30f), Rgb::Zero());
+    }, 256);
+    parallel_for(static_cast<Index>(changes_.size()), [&](Index k) {
+        if (!changes_[static_cast<std::size_t>(k)]) return;
+        changes_[static_cast<std::size_t>(k)] = 0;
+        const Index j = first_point_ + k;
         const auto index = push_.parents.indices(j);
         const auto weight = push_.parents.values(j);
         Rgb taken = Rgb::Zero();
-        for (std::size_t e = 0; e < index.size(); ++e)
-            if (const std::uint32_t slot = slot_[index[e] - first_parent_]; slot != none)
-                taken += weight[e] * taken_[slot].share;
+        for (std::size_t e = 0; e < index.size(); ++e) taken += weight[e] * share_[index[e] - first_parent_];
         const Rgb e = display.irradiance(j);
         display.add(j, e.max(0.0f) * (1.0f - taken.min(1.0f)) - e);
         // Rounding may leave a hair below zero.
         if (const Rgb rest = display.irradiance(j); (rest < 0.0f).any()) display.add(j, -2.0f * rest.min(0.0f));
-        changes_[j - first_point_] = 0;
-    }, 512);
-    for (const Parent& parent : taken_) slot_[parent.id] = none;
+    }, 1024);
+    parallel_for(parents, [&](Index k) {
+        if (!is_asked_[static_cast<std::size_t>(k)]) return;
+        is_asked_[static_cast<std::size_t>(k)] = 0;
+        share_[static_cast<std::size_t>(k)] = Rgb::Zero();
+    }, 4096);
 }
 
 } // namespace afterglow

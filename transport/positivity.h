@@ -43,15 +43,11 @@ private:
     std::uint32_t first_parent_, first_point_; // what the following are counted from
     std::vector<std::uint32_t> child_begin_;   // a parent each, and the end
     std::vector<Child> child_;
-    struct Parent {
-        std::uint32_t id;
-        Rgb share; // what its points lose of their irradiance
-    };
-    std::vector<std::uint32_t> slot_;          // a parent each, its place in taken_; `none` between calls
-    std::vector<Parent> taken_;
-    std::vector<std::uint8_t> changes_;        // a point each; zero between calls
-    std::vector<std::uint32_t> changed_;
-    static constexpr std::uint32_t none = ~0u;
+    // A parent each: whether any of its points is below zero, and what all lose of their irradiance; a point
+    // each: whether it has such a parent. Zero between calls.
+    std::vector<std::uint8_t> is_asked_;
+    std::vector<Rgb> share_;
+    std::vector<std::uint8_t> changes_;
 };
 
 } // namespace afterglow
