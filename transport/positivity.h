@@ -24,7 +24,7 @@ namespace afterglow {
 void make_positive(const PointHierarchy& points, const PushOperator& push, VectorIrradiance& field);
 
 /// The same for one hierarchy again and again, where it is known already which points of the display level
-/// are below zero: it touches no others than these and those that they take from.
+/// are below zero: it reads the light of no others than these and those that they take from.
 class PositivityLimiter {
 public:
     /// Keeps references.
