@@ -293,7 +293,7 @@ GatherDirections gather_directions(const LinkOptions& options, const PointHierar
     return {gather_rays(options, points, level), hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
 
-Links join_links(std::vector<std::vector<PackedLink>> rows) {
+Links join_links(LinkRows rows) {
     std::vector<std::uint64_t> begin{0};
     for (const auto& row : rows)
         begin.push_back(begin.back() + row.size());
@@ -306,11 +306,11 @@ Links join_links(std::vector<std::vector<PackedLink>> rows) {
     return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
 }
 
-Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
-                 const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
-                 LinkStatistics& statistics, const LinkResumption& resumption) {
+LinkRows make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
+                    const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
+                    LinkStatistics& statistics, const LinkResumption& resumption) {
     constexpr Index samples_at_once = 1 << 20, grain = 16;
-    std::vector<std::vector<PackedLink>> done(points.size());
+    LinkRows done(points.size());
     std::vector<PushedRow> parents, pushed;
     std::vector<GatherSample> samples;
     ScratchPool<RowMaker> makers(
@@ -374,8 +374,7 @@ Links make_links(const Surface& surface, const PointHierarchy& points, const Pus
     }
     statistics.patches = rows.made();
     statistics.uncovered_patches = rows.uncovered();
-    std::vector<PushedRow>().swap(parents); // joining takes the links' memory twice
-    return join_links(std::move(done));
+    return done;
 }
 
 } // namespace afterglow

@@ -45,12 +45,14 @@ struct LinkStatistics {
     std::uint64_t patches = 0, uncovered_patches = 0;
 };
 
+using LinkRows = std::vector<std::vector<PackedLink>>; // a receiver each
+
 /// Where make_links() can be left and gone on with. Receivers come in the order of their numbers.
 struct LinkResumption {
     std::uint32_t done = 0; // the links of the receivers before this one are known:
     Links links;            // these rows; further rows are not looked at
     /// Is called between two batches, with what suffices to go on from there: `done`, and all rows.
-    std::function<void(std::uint32_t done, const std::vector<std::vector<PackedLink>>& rows)> pause = {};
+    std::function<void(std::uint32_t done, const LinkRows& rows)> pause = {};
 };
 
 /// The threshold that is given, or 0.06 target_error min(1, N / 60 000) for N points: what is
@@ -71,11 +73,12 @@ GatherDirections gather_directions(const LinkOptions& options, const PointHierar
 /// response to uniform light stays exact.
 ///
 /// Adds to `statistics`. Where it goes on, the sender rows that were made before must be made.
-Links make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
-                 const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
-                 LinkStatistics& statistics, const LinkResumption& resumption = {});
+/// The rows that it returns are to be joined where sender rows take no memory any more.
+LinkRows make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
+                    const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
+                    LinkStatistics& statistics, const LinkResumption& resumption = {});
 
-/// Joins rows of links, one a receiver; they are freed on the way.
-Links join_links(std::vector<std::vector<PackedLink>> rows);
+/// Takes twice their memory.
+Links join_links(LinkRows rows);
 
 } // namespace afterglow

@@ -11,6 +11,7 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 namespace afterglow {
 namespace {
@@ -81,33 +82,35 @@ void make_neumann(const Surface& surface, const LinkOptions& links, Checkpoint* 
     report.push_seconds = seconds_since(start);
 
     start = Clock::now();
-    SenderRows rows(surface, basis, transfer.sender_levels);
-    rows.see(arrivals(surface, transfer.points, links.seed));
+    std::optional<SenderRows> rows(std::in_place, surface, basis, transfer.sender_levels);
+    rows->see(arrivals(surface, transfer.points, links.seed));
     LinkResumption resumption;
     if (begun) {
-        if (!begun->made_rows.empty() && std::ranges::max(begun->made_rows) >= rows.count())
+        if (!begun->made_rows.empty() && std::ranges::max(begun->made_rows) >= rows->count())
             throw FileError(checkpoint->path(), "names sender rows that are not there");
-        rows.require(begun->made_rows);
+        rows->require(begun->made_rows);
         resumption.done = begun->done;
         resumption.links = transfer.links;
     } else {
-        transfer.pull = rows.make_pull_operator();
+        transfer.pull = rows->make_pull_operator();
     }
     report.pull_seconds = seconds_since(start);
     if (checkpoint) {
-        const auto save = [&](std::uint32_t done, const std::vector<std::vector<PackedLink>>& of_receivers) {
+        const auto save = [&](std::uint32_t done, const LinkRows& of_receivers) {
             transfer.links = join_links(of_receivers);
             transfer.sender_areas.assign(transfer.senders() - transfer.points.begin(transfer.sender_levels - 1), 0.0f);
-            checkpoint->save(transfer, done, rows.made_numbers(), report);
+            checkpoint->save(transfer, done, rows->made_numbers(), report);
         };
-        if (!begun) save(0, std::vector<std::vector<PackedLink>>(transfer.points.size()));
-        resumption.pause = [=](std::uint32_t done, const std::vector<std::vector<PackedLink>>& of_receivers) {
+        if (!begun) save(0, LinkRows(transfer.points.size()));
+        resumption.pause = [=](std::uint32_t done, const LinkRows& of_receivers) {
             if (checkpoint->is_due()) save(done, of_receivers);
         };
     }
-    transfer.links = make_links(surface, transfer.points, transfer.push, transfer.pull, rows, links,
-                                report.links, resumption);
-    transfer.sender_areas = rows.finest_areas();
+    LinkRows rows_of_links = make_links(surface, transfer.points, transfer.push, transfer.pull, *rows, links,
+                                        report.links, resumption);
+    transfer.sender_areas = rows->finest_areas();
+    rows.reset();
+    transfer.links = join_links(std::move(rows_of_links));
 }
 
 void make_paper(const Surface& surface, const LinkOptions& links, TransferOperator& transfer,

@@ -46,8 +46,7 @@ struct LinksExample {
                 LinkStatistics* statistics = nullptr) const {
         LinkStatistics unused;
         SenderRows rows(surface, basis, sender_levels, patch_share);
-        return make_links(surface, points, push, pull, rows, options,
-                          statistics ? *statistics : unused);
+        return join_links(make_links(surface, points, push, pull, rows, options, statistics ? *statistics : unused));
     }
 
     std::uint32_t senders() const { return points.end(sender_levels - 1); }
