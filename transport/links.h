@@ -72,13 +72,13 @@ GatherDirections gather_directions(const LinkOptions& options, const PointHierar
 /// thresholded. What is dropped of the coarsest senders goes onto those that stay, so that the
 /// response to uniform light stays exact.
 ///
-/// Adds to `statistics`. Where it goes on, the sender rows that were made before must be made.
-/// The rows that it returns are to be joined where sender rows take no memory any more.
+/// Adds to `statistics`. Where it goes on, the sender rows that were made before must be made. What it
+/// returns is best joined when the sender rows are gone.
 LinkRows make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
                     const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
                     LinkStatistics& statistics, const LinkResumption& resumption = {});
 
-/// Takes twice their memory.
+/// Takes twice the memory of the rows for a while.
 Links join_links(LinkRows rows);
 
 } // namespace afterglow
