@@ -280,6 +280,16 @@ void require_rows(std::span<const GatherSample> samples, SenderRows& rows) {
     rows.require(needed);
 }
 
+/// Of each receiver of the parents' level, the last of its children among those of a level.
+std::vector<Index> last_children(const PointHierarchy& points, const PushOperator& push, int level) {
+    const int parent_level = points.parent_level[level];
+    const std::uint32_t first_parent = points.begin(parent_level);
+    std::vector<Index> last(points.end(parent_level) - first_parent, -1);
+    for (Index i = points.begin(level); i < points.end(level); ++i)
+        for (const std::uint32_t parent : push.parents.indices(i)) last[parent - first_parent] = i;
+    return last;
+}
+
 } // namespace
 
 float link_threshold(const LinkOptions& options, const PointHierarchy& points) {
@@ -329,11 +339,14 @@ LinkRows make_links(const Surface& surface, const PointHierarchy& points, const 
                              noisy ? least_share_of_a_ray * of_one_ray : 0.0f);
         parents = std::move(pushed);
         pushed.assign(points.end(l) - points.begin(l), {});
+        const std::vector<Index> last_child = l > 0 ? last_children(points, push, l) : std::vector<Index>();
         const int count = directions.rays();
         const Index batch = std::max<Index>(grain, samples_at_once / count);
         for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
             const Index end = std::min<Index>(begin + batch, points.end(l));
             rays_begun += static_cast<double>(end - begin) * count;
+            for (std::size_t p = 0; p < last_child.size(); ++p) // what no child needs any more
+                if (last_child[p] < begin) PushedRow().swap(parents[p]);
             const auto for_each_receiver = [&](const auto& body) {
                 const auto start = Clock::now();
                 parallel_ranges(end - begin, grain, [&](Index first, Index last) {
