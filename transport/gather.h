@@ -20,7 +20,7 @@ namespace afterglow {
 /// it ends, as one sender level has it.
 struct GatherSample {
     Vec3 weight;       // omega / (pi pdf N): direction, no cosine
-    std::uint32_t row; // number of SenderRows; no_index where the ray leaves the scene
+    std::uint32_t row; // number of SenderRows, then its place; no_index where the ray leaves the scene
 };
 
 /// Which sender level a ray looks at: the finest whose spacing R_l is at least

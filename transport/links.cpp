@@ -75,13 +75,13 @@ private:
         for (std::size_t k = 0; k < samples.size(); ++k) {
             // The rows lie scattered over memory: ask for them while others are added.
             if (k + far < samples.size() && samples[k + far].row != no_index)
-                rows_.prefetch_place(samples[k + far].row);
+                rows_.prefetch_begin(samples[k + far].row);
             if (k + near < samples.size() && samples[k + near].row != no_index)
                 rows_.prefetch_row(samples[k + near].row);
             const GatherSample& s = samples[k];
             if (s.row == no_index) continue;
             const LinkVector weight(s.weight.x(), s.weight.y(), s.weight.z(), 0.0f);
-            for (const BasisEntry& entry : rows_.row(s.row))
+            for (const BasisEntry& entry : rows_.at(s.row))
                 link_.at(entry.index) += entry.value * weight;
         }
         for (int l = sender_levels_ - 1; l > 0; --l)
@@ -267,17 +267,24 @@ std::uint64_t rays_of_all(const LinkOptions& options, const PointHierarchy& poin
     return rays;
 }
 
-/// Makes the rows at the ends of these rays, those of a range of samples at a time, in order.
-void require_rows(std::span<const GatherSample> samples, SenderRows& rows) {
+/// Makes the rows at the ends of these rays, those of a range of samples at a time, in order, and puts
+/// their places in the stead of their numbers.
+void require_rows(std::span<GatherSample> samples, SenderRows& rows) {
     constexpr Index grain = 8192;
-    std::vector<std::vector<std::uint32_t>> missing(samples.size() / grain + 1);
+    std::vector<std::vector<GatherSample*>> missing(samples.size() / grain + 1);
     parallel_ranges(static_cast<Index>(samples.size()), grain, [&](Index first, Index last) {
-        for (const GatherSample& s : samples.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first)))
-            if (s.row != no_index && !rows.is_made(s.row)) missing[static_cast<std::size_t>(first / grain)].push_back(s.row);
+        for (GatherSample& s : samples.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first))) {
+            if (s.row == no_index) continue;
+            if (rows.is_made(s.row)) s.row = rows.place(s.row);
+            else missing[static_cast<std::size_t>(first / grain)].push_back(&s);
+        }
     });
     std::vector<std::uint32_t> needed;
-    for (const auto& of_range : missing) needed.insert(needed.end(), of_range.begin(), of_range.end());
+    for (const auto& of_range : missing)
+        for (const GatherSample* s : of_range) needed.push_back(s->row);
     rows.require(needed);
+    for (const auto& of_range : missing)
+        for (GatherSample* s : of_range) s->row = rows.place(s->row);
 }
 
 /// Of each receiver of the parents' level, the last of its children among those of a level.

@@ -44,7 +44,7 @@ SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int le
         count += grid_.back().patch_count();
     }
     if (count >= no_index) throw Error("too many surface patches; choose a larger --coarse-radius");
-    place_.resize(count);
+    place_.resize(count, no_index);
     is_cut_.resize(count);
 }
 
@@ -127,8 +127,15 @@ void SenderRows::see(std::span<const Hit> arrivals) {
                 sides[g].second = corner;
             }
         });
+        const bool finest = l + 1 == levels();
+        std::vector<Arrived> at_second;
         for (std::size_t g = 0; g < groups.size(); ++g) {
             const std::uint32_t first = first_[l] + static_cast<std::uint32_t>(groups[g].front() >> 32);
+            const auto at_sides = static_cast<std::uint32_t>(groups[g].size());
+            std::uint32_t hidden_from_first = 0;
+            for (const std::uint64_t key : groups[g])
+                hidden_from_first += is_hidden[arrival_of(key)];
+            if (finest && hidden_from_first < at_sides) arrived_.push_back({first, at_sides - hidden_from_first});
             if (sides[g].first) centre_[first] = sides[g].first;
             if (!sides[g].second) continue;
             const auto second = static_cast<std::uint32_t>(place_.size());
@@ -136,23 +143,23 @@ void SenderRows::see(std::span<const Hit> arrivals) {
             second_[first] = second;
             second_level_.push_back(static_cast<std::uint8_t>(l));
             centre_[second] = sides[g].second;
-            place_.emplace_back();
+            place_.push_back(no_index);
+            if (finest && hidden_from_first > 0) at_second.push_back({second, hidden_from_first});
         }
+        arrived_.insert(arrived_.end(), at_second.begin(), at_second.end());
     }
-    // Of the finest level, the last: is_hidden is still its.
-    hits_.assign(place_.size() - first_.back(), 0);
-    for (Index k = 0; k < count; ++k) {
-        std::uint32_t number = first_.back() + grid_.back().patch_of(arrivals[k]);
-        if (is_hidden[k] && is_cut_[number]) number = second_.at(number);
-        ++hits_[number - first_.back()];
-    }
+}
+
+std::uint32_t SenderRows::rays_at(std::uint32_t number) const {
+    const auto found = std::ranges::lower_bound(arrived_, number, {}, &Arrived::number);
+    return found != arrived_.end() && found->number == number ? found->rays : 0;
 }
 
 void SenderRows::require(std::span<const std::uint32_t> numbers) {
     std::vector<std::uint32_t> missing;
     for (const std::uint32_t number : numbers)
-        if (number != no_index && place_[number].count == not_made) {
-            place_[number].count = 0; // listed once
+        if (number != no_index && !is_made(number)) {
+            place_[number] = static_cast<std::uint32_t>(made() + missing.size()); // listed once
             missing.push_back(number);
         }
     std::vector<std::vector<BasisEntry>> rows(missing.size());
@@ -176,13 +183,11 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
                 basis_.evaluate(l, x, rows[i]);
         drop_small_shares(rows[i]);
     });
-    for (std::size_t i = 0; i < missing.size(); ++i) {
-        place_[missing[i]] = {static_cast<std::uint32_t>(entries_.size()),
-                              static_cast<std::uint32_t>(rows[i].size())};
-        entries_.insert(entries_.end(), rows[i].begin(), rows[i].end());
-        uncovered_ += rows[i].empty();
+    for (const std::vector<BasisEntry>& row : rows) {
+        entries_.insert(entries_.end(), row.begin(), row.end());
+        begin_.push_back(static_cast<std::uint32_t>(entries_.size()));
+        uncovered_ += row.empty();
     }
-    made_ += missing.size();
     if (entries_.size() > 0xf0000000u)
         throw Error("too many sender rows; choose a larger --coarse-radius");
 }
@@ -190,8 +195,8 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
 PullOperator SenderRows::make_pull_operator() {
     const PointHierarchy& points = basis_.points();
     std::vector<std::uint32_t> patches; // rows of the finest level in which rays were counted
-    for (std::uint32_t n = first_.back(); n < place_.size(); ++n)
-        if (hits(n) > 0) patches.push_back(n);
+    for (const Arrived& arrived : arrived_)
+        patches.push_back(arrived.number);
     const auto count = static_cast<Index>(patches.size());
     std::vector<std::vector<std::uint32_t>> seen(levels()); // number of each patch's row on a level
     for (int l = 0; l + 1 < levels(); ++l) {
@@ -215,7 +220,7 @@ PullOperator SenderRows::make_pull_operator() {
             for (const BasisEntry& entry : row(seen[l][p]))
                 if (entry.index >= points.begin(l))
                     sees[begin[entry.index - points.begin(l) + 1]++] =
-                        {p, static_cast<float>(hits(patches[p])) * entry.value};
+                        {p, static_cast<float>(arrived_[p].rays) * entry.value};
         ScratchPool<Accumulator<double>> sums(
             [&] { return std::make_unique<Accumulator<double>>(points.end(l + 1), 0.0); });
         parallel_ranges(points.end(l) - points.begin(l), 64, [&](Index first, Index last) {
@@ -258,7 +263,7 @@ std::vector<float> SenderRows::finest_areas() const {
     const std::uint32_t begin = basis_.points().begin(finest);
     std::vector<double> area(basis_.points().end(finest) - begin, 0.0);
     const auto add = [&](std::uint32_t number, double of_row) {
-        if (place_[number].count == not_made) return;
+        if (!is_made(number)) return;
         for (const BasisEntry& entry : row(number))
             if (entry.index >= begin) area[entry.index - begin] += of_row * entry.value;
     };
@@ -269,8 +274,8 @@ std::vector<float> SenderRows::finest_areas() const {
             continue;
         }
         const std::uint32_t second = second_.at(number);
-        const double counted = hits(number) + hits(second);
-        const double share = counted > 0.0 ? hits(second) / counted : 0.0;
+        const double counted = rays_at(number) + rays_at(second);
+        const double share = counted > 0.0 ? rays_at(second) / counted : 0.0;
         add(number, (1.0 - share) * grid.area(patch));
         add(second, share * grid.area(patch));
     }

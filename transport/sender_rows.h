@@ -37,19 +37,21 @@ public:
         const std::uint32_t n = first_[level] + grid_[level].patch_of(hit);
         return is_cut_[n] ? side_of(hit, n) : n;
     }
-    bool is_made(std::uint32_t number) const { return place_[number].count != not_made; }
+    bool is_made(std::uint32_t number) const { return place_[number] != no_index; }
     /// Makes these rows (repetitions allowed, no_index is passed over); not to be called concurrently.
     void require(std::span<const std::uint32_t> numbers);
-    /// A row that was required; empty where no function sees the patch.
-    std::span<const BasisEntry> row(std::uint32_t number) const {
-        const Place& p = place_[number];
-        return {entries_.data() + p.begin, p.count};
+    /// Where a row that was required stands among all that were: these are fewer than the numbers.
+    std::uint32_t place(std::uint32_t number) const { return place_[number]; }
+    /// The row there; empty where no function sees the patch.
+    std::span<const BasisEntry> at(std::uint32_t place) const {
+        return {entries_.data() + begin_[place], begin_[place + 1] - begin_[place]};
     }
-    /// Asks for a row's place, or its entries, ahead of use.
-    void prefetch_place(std::uint32_t number) const { __builtin_prefetch(&place_[number]); }
-    void prefetch_row(std::uint32_t number) const {
-        __builtin_prefetch(entries_.data() + place_[number].begin);
-        __builtin_prefetch(entries_.data() + place_[number].begin + 8);
+    std::span<const BasisEntry> row(std::uint32_t number) const { return at(place_[number]); }
+    /// Asks for where a row begins, or for its entries, ahead of use.
+    void prefetch_begin(std::uint32_t place) const { __builtin_prefetch(&begin_[place]); }
+    void prefetch_row(std::uint32_t place) const {
+        __builtin_prefetch(entries_.data() + begin_[place]);
+        __builtin_prefetch(entries_.data() + begin_[place] + 8);
     }
     /// Finds the patches that are cut, and counts the rays that end in each; to be called once, before
     /// all else, with rays such as the gather's.
@@ -63,36 +65,34 @@ public:
     /// those that are seen.
     std::vector<float> finest_areas() const;
 
-    std::size_t made() const { return made_; }
+    std::size_t made() const { return begin_.size() - 1; }
     std::vector<std::uint32_t> made_numbers() const; // rising
     std::uint32_t count() const { return static_cast<std::uint32_t>(place_.size()); } // of all, made or not
     std::size_t uncovered() const { return uncovered_; } // rows that are empty
 
 private:
-    struct Place {
-        std::uint32_t begin = 0, count = not_made;
+    struct Arrived {
+        std::uint32_t number, rays;
     };
-    static constexpr std::uint32_t not_made = ~0u;
     const Surface& surface_;
     const ShepardBasis& basis_;
     std::vector<PatchGrid> grid_;       // a level each
     std::vector<std::uint32_t> first_;  // of a level's rows; after the last level's, the second rows
-    std::vector<Place> place_;
+    std::vector<std::uint32_t> place_;  // no_index: not made
     std::vector<bool> is_cut_;                                      // a first row each
     std::unordered_map<std::uint32_t, std::uint32_t> second_;       // rows of patches that are cut
     std::vector<std::uint8_t> second_level_;                        // a second row each
     std::unordered_map<std::uint32_t, Hit> centre_;                 // where it is not the patch's own
-    std::vector<std::uint32_t> hits_; // rays counted, from the first of the finest level's rows on
+    std::vector<Arrived> arrived_; // rays counted, of the finest level's rows that any arrive at, numbers rising
+    std::vector<std::uint32_t> begin_{0}; // of a place's entries, and the end of all
     std::vector<BasisEntry> entries_;
-    std::size_t made_ = 0, uncovered_ = 0;
+    std::size_t uncovered_ = 0;
 
     int level_of(std::uint32_t number) const;
     Hit centre(std::uint32_t number) const;
     bool hidden(const SurfacePoint& x, const SurfacePoint& centre, float relief) const;
     std::uint32_t side_of(const Hit& hit, std::uint32_t first) const;
-    std::uint32_t hits(std::uint32_t number) const {
-        return hits_.empty() ? 0 : hits_[number - first_.back()];
-    }
+    std::uint32_t rays_at(std::uint32_t number) const; // that were counted
 };
 
 /// Appends the row of a finest level at any hit, not at a patch's centre; none where evaluate_or_nearest
