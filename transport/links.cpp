@@ -326,7 +326,8 @@ Links join_links(LinkRows rows) {
 LinkRows make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
                     const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
                     LinkStatistics& statistics, const LinkResumption& resumption) {
-    constexpr Index samples_at_once = 1 << 20, grain = 16;
+    constexpr Index samples_of_a_thread = 1 << 17, grain = 16;
+    const Index samples_at_once = samples_of_a_thread * thread_count();
     LinkRows done(points.size());
     std::vector<PushedRow> parents, pushed;
     std::vector<GatherSample> samples;
@@ -335,6 +336,7 @@ LinkRows make_links(const Surface& surface, const PointHierarchy& points, const 
     const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
     statistics.threshold = link_threshold(options, points);
     const auto all_rays = static_cast<double>(rays_of_all(options, points));
+    const Index first_to_do = resumption.done;
     double rays_begun = 0.0; // those of receivers that were done before included
     for (int l = 0; l < points.levels(); ++l) {
         if (!points.leads_to_display(l)) continue; // senders alone
@@ -349,8 +351,9 @@ LinkRows make_links(const Surface& surface, const PointHierarchy& points, const 
         const std::vector<Index> last_child = l > 0 ? last_children(points, push, l) : std::vector<Index>();
         const int count = directions.rays();
         const Index batch = std::max<Index>(grain, samples_at_once / count);
-        for (Index begin = points.begin(l); begin < points.end(l); begin += batch) {
-            const Index end = std::min<Index>(begin + batch, points.end(l));
+        for (Index begin = points.begin(l), end; begin < points.end(l); begin = end) {
+            end = std::min<Index>(begin + batch, points.end(l));
+            if (begin < first_to_do) end = std::min(end, first_to_do);
             rays_begun += static_cast<double>(end - begin) * count;
             for (std::size_t p = 0; p < last_child.size(); ++p) // what no child needs any more
                 if (last_child[p] < begin) PushedRow().swap(parents[p]);
@@ -362,7 +365,7 @@ LinkRows make_links(const Surface& surface, const PointHierarchy& points, const 
                 });
                 statistics.links_seconds += seconds_since(start);
             };
-            if (end <= static_cast<Index>(resumption.done)) {
+            if (end <= first_to_do) {
                 for_each_receiver([&](RowMaker& maker, Index i) {
                     const auto row = resumption.links.row(i);
                     done[i].assign(row.begin(), row.end());
