@@ -287,15 +287,129 @@ void require_rows(std::span<GatherSample> samples, SenderRows& rows) {
         for (GatherSample* s : of_range) s->row = rows.place(s->row);
 }
 
-/// Of each receiver of the parents' level, the last of its children among those of a level.
-std::vector<Index> last_children(const PointHierarchy& points, const PushOperator& push, int level) {
-    const int parent_level = points.parent_level[level];
-    const std::uint32_t first_parent = points.begin(parent_level);
-    std::vector<Index> last(points.end(parent_level) - first_parent, -1);
-    for (Index i = points.begin(level); i < points.end(level); ++i)
-        for (const std::uint32_t parent : push.parents.indices(i)) last[parent - first_parent] = i;
-    return last;
-}
+/// Makes all links: level by level, since children need their parents' rows, and a batch of receivers at a
+/// time, so that few samples are held at once.
+class LinkMaker {
+public:
+    LinkMaker(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
+              const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
+              LinkStatistics& statistics, const LinkResumption& resumption)
+        : surface_(surface), points_(points), push_(push), rows_(rows), options_(options),
+          statistics_(statistics), resumption_(resumption), first_to_do_(resumption.done),
+          makers_([&] { return std::make_unique<RowMaker>(points, push, pull, rows); }),
+          links_(points.size()) {
+        statistics.threshold = link_threshold(options, points);
+    }
+
+    LinkRows make() {
+        for (int l = 0; l < points_.levels(); ++l)
+            if (points_.leads_to_display(l)) make_level(l); // not senders alone
+        statistics_.patches = rows_.made();
+        statistics_.uncovered_patches = rows_.uncovered();
+        return std::move(links_);
+    }
+
+private:
+    struct Level {
+        int number;
+        Index begin;
+        GatherDirections directions;
+        LevelThresholds thresholds;
+    };
+    static constexpr Index grain = 16; // receivers that a thread takes at a time
+
+    void make_level(int l) {
+        constexpr Index samples_of_a_thread = 1 << 17;
+        const GatherDirections directions = gather_directions(options_, points_, l);
+        const bool noisy = !options_.threshold && options_.rays < LinkOptions().rays;
+        const float of_one_ray = 2.0f / static_cast<float>(directions.rays());
+        const Level level{l, points_.begin(l), directions,
+                          level_thresholds(statistics_.threshold, points_, rows_.levels(), l,
+                                           noisy ? least_share_of_a_ray * of_one_ray : 0.0f)};
+        parents_ = std::move(pushed_);
+        pushed_.assign(points_.end(l) - points_.begin(l), {});
+        const std::vector<Index> last_child = l > 0 ? last_children(l) : std::vector<Index>();
+        const Index level_end = points_.end(l);
+        const Index batch = std::max(grain, samples_of_a_thread * thread_count() / directions.rays());
+        for (Index begin = level.begin, end; begin < level_end; begin = end) {
+            for (std::size_t p = 0; p < last_child.size(); ++p) // what no child needs any more
+                if (last_child[p] < begin) PushedRow().swap(parents_[p]);
+            const Index stop = begin < first_to_do_ ? std::min(first_to_do_, level_end) : level_end;
+            end = std::min(begin + batch, stop);
+            rays_begun_ += static_cast<double>(end - begin) * directions.rays();
+            if (end <= first_to_do_) take_batch(level, begin, end);
+            else make_batch(level, begin, end);
+        }
+    }
+
+    /// Of each receiver of the parents' level, the last of its children among those of a level.
+    std::vector<Index> last_children(int l) const {
+        const int parent_level = points_.parent_level[l];
+        const std::uint32_t first_parent = points_.begin(parent_level);
+        std::vector<Index> last(points_.end(parent_level) - first_parent, -1);
+        for (Index i = points_.begin(l); i < points_.end(l); ++i)
+            for (const std::uint32_t parent : push_.parents.indices(i)) last[parent - first_parent] = i;
+        return last;
+    }
+
+    /// Receivers whose links are known.
+    void take_batch(const Level& level, Index begin, Index end) {
+        for_each_receiver(begin, end, [&](RowMaker& maker, Index i) {
+            const auto row = resumption_.links.row(i);
+            links_[i].assign(row.begin(), row.end());
+            if (level.thresholds.has_children)
+                maker.push_again(i, level.number, resumption_.links, parents_, level.thresholds.negligible,
+                                 pushed_[i - level.begin]);
+        });
+    }
+
+    void make_batch(const Level& level, Index begin, Index end) {
+        const int count = level.directions.rays();
+        auto start = Clock::now();
+        samples_.resize(static_cast<std::size_t>((end - begin) * count));
+        trace_gather(surface_, rows_, points_, begin, level.begin, level.directions,
+                     {options_.footprint_angle, points_.spacing[0], rows_.levels()}, samples_);
+        statistics_.trace_seconds += seconds_since(start);
+        statistics_.rays += samples_.size();
+        start = Clock::now();
+        require_rows(samples_, rows_);
+        statistics_.rows_seconds += seconds_since(start);
+        std::vector<std::uint64_t> links_before(static_cast<std::size_t>(end - begin));
+        for_each_receiver(begin, end, [&](RowMaker& maker, Index i) {
+            const auto r = static_cast<std::size_t>(i - begin);
+            maker.make(i, level.number, std::span(samples_).subspan(r * count, count), parents_,
+                       level.thresholds, links_[i], pushed_[i - level.begin], links_before[r]);
+        });
+        for (const std::uint64_t of_receiver : links_before)
+            statistics_.links_before += of_receiver;
+        if (options_.progress) options_.progress(rays_begun_ / all_rays_);
+        if (resumption_.pause) resumption_.pause(static_cast<std::uint32_t>(end), links_);
+    }
+
+    void for_each_receiver(Index begin, Index end, const auto& body) {
+        const auto start = Clock::now();
+        parallel_ranges(end - begin, grain, [&](Index first, Index last) {
+            const auto maker = makers_.borrow();
+            for (Index i = begin + first; i < begin + last; ++i) body(*maker, i);
+        });
+        statistics_.links_seconds += seconds_since(start);
+    }
+
+    const Surface& surface_;
+    const PointHierarchy& points_;
+    const PushOperator& push_;
+    SenderRows& rows_;
+    const LinkOptions& options_;
+    LinkStatistics& statistics_;
+    const LinkResumption& resumption_;
+    const Index first_to_do_;
+    ScratchPool<RowMaker> makers_;
+    LinkRows links_;
+    std::vector<PushedRow> parents_, pushed_; // of the level above, and of the level that is being made
+    std::vector<GatherSample> samples_;
+    const double all_rays_ = static_cast<double>(rays_of_all(options_, points_));
+    double rays_begun_ = 0.0; // those of receivers that were done before included
+};
 
 } // namespace
 
@@ -326,78 +440,7 @@ Links join_links(LinkRows rows) {
 LinkRows make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,
                     const PullOperator& pull, SenderRows& rows, const LinkOptions& options,
                     LinkStatistics& statistics, const LinkResumption& resumption) {
-    constexpr Index samples_of_a_thread = 1 << 17, grain = 16;
-    const Index samples_at_once = samples_of_a_thread * thread_count();
-    LinkRows done(points.size());
-    std::vector<PushedRow> parents, pushed;
-    std::vector<GatherSample> samples;
-    ScratchPool<RowMaker> makers(
-        [&] { return std::make_unique<RowMaker>(points, push, pull, rows); });
-    const Footprint footprint{options.footprint_angle, points.spacing[0], rows.levels()};
-    statistics.threshold = link_threshold(options, points);
-    const auto all_rays = static_cast<double>(rays_of_all(options, points));
-    const Index first_to_do = resumption.done;
-    double rays_begun = 0.0; // those of receivers that were done before included
-    for (int l = 0; l < points.levels(); ++l) {
-        if (!points.leads_to_display(l)) continue; // senders alone
-        const GatherDirections directions = gather_directions(options, points, l);
-        const bool noisy = !options.threshold && options.rays < LinkOptions().rays;
-        const float of_one_ray = 2.0f / static_cast<float>(directions.rays());
-        const LevelThresholds thresholds =
-            level_thresholds(statistics.threshold, points, rows.levels(), l,
-                             noisy ? least_share_of_a_ray * of_one_ray : 0.0f);
-        parents = std::move(pushed);
-        pushed.assign(points.end(l) - points.begin(l), {});
-        const std::vector<Index> last_child = l > 0 ? last_children(points, push, l) : std::vector<Index>();
-        const int count = directions.rays();
-        const Index batch = std::max<Index>(grain, samples_at_once / count);
-        for (Index begin = points.begin(l), end; begin < points.end(l); begin = end) {
-            end = std::min<Index>(begin + batch, points.end(l));
-            if (begin < first_to_do) end = std::min(end, first_to_do);
-            rays_begun += static_cast<double>(end - begin) * count;
-            for (std::size_t p = 0; p < last_child.size(); ++p) // what no child needs any more
-                if (last_child[p] < begin) PushedRow().swap(parents[p]);
-            const auto for_each_receiver = [&](const auto& body) {
-                const auto start = Clock::now();
-                parallel_ranges(end - begin, grain, [&](Index first, Index last) {
-                    const auto maker = makers.borrow();
-                    for (Index i = begin + first; i < begin + last; ++i) body(*maker, i);
-                });
-                statistics.links_seconds += seconds_since(start);
-            };
-            if (end <= first_to_do) {
-                for_each_receiver([&](RowMaker& maker, Index i) {
-                    const auto row = resumption.links.row(i);
-                    done[i].assign(row.begin(), row.end());
-                    if (thresholds.has_children)
-                        maker.push_again(i, l, resumption.links, parents, thresholds.negligible,
-                                         pushed[i - points.begin(l)]);
-                });
-                continue;
-            }
-            auto start = Clock::now();
-            samples.resize(static_cast<std::size_t>((end - begin) * count));
-            trace_gather(surface, rows, points, begin, points.begin(l), directions, footprint, samples);
-            statistics.trace_seconds += seconds_since(start);
-            statistics.rays += samples.size();
-            start = Clock::now();
-            require_rows(samples, rows);
-            statistics.rows_seconds += seconds_since(start);
-            std::vector<std::uint64_t> links_before(static_cast<std::size_t>(end - begin));
-            for_each_receiver([&](RowMaker& maker, Index i) {
-                const auto r = static_cast<std::size_t>(i - begin);
-                maker.make(i, l, std::span(samples).subspan(r * count, count), parents, thresholds, done[i],
-                           pushed[i - points.begin(l)], links_before[r]);
-            });
-            for (const std::uint64_t of_receiver : links_before)
-                statistics.links_before += of_receiver;
-            if (options.progress) options.progress(rays_begun / all_rays);
-            if (resumption.pause) resumption.pause(static_cast<std::uint32_t>(end), done);
-        }
-    }
-    statistics.patches = rows.made();
-    statistics.uncovered_patches = rows.uncovered();
-    return done;
+    return LinkMaker(surface, points, push, pull, rows, options, statistics, resumption).make();
 }
 
 } // namespace afterglow

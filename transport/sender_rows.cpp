@@ -52,7 +52,7 @@ int SenderRows::level_of(std::uint32_t number) const {
     if (number < is_cut_.size())
         return static_cast<int>(std::upper_bound(first_.begin(), first_.end(), number)
                                 - first_.begin() - 1);
-    return second_level_[number - is_cut_.size()];
+    return second_rows_[number - is_cut_.size()].level;
 }
 
 Hit SenderRows::centre(std::uint32_t number) const {
@@ -141,18 +141,13 @@ void SenderRows::see(std::span<const Hit> arrivals) {
             const auto second = static_cast<std::uint32_t>(place_.size());
             is_cut_[first] = true;
             second_[first] = second;
-            second_level_.push_back(static_cast<std::uint8_t>(l));
+            second_rows_.push_back({l, static_cast<double>(hidden_from_first) / at_sides});
             centre_[second] = sides[g].second;
             place_.push_back(no_index);
             if (finest && hidden_from_first > 0) at_second.push_back({second, hidden_from_first});
         }
         arrived_.insert(arrived_.end(), at_second.begin(), at_second.end());
     }
-}
-
-std::uint32_t SenderRows::rays_at(std::uint32_t number) const {
-    const auto found = std::ranges::lower_bound(arrived_, number, {}, &Arrived::number);
-    return found != arrived_.end() && found->number == number ? found->rays : 0;
 }
 
 void SenderRows::require(std::span<const std::uint32_t> numbers) {
@@ -194,9 +189,10 @@ void SenderRows::require(std::span<const std::uint32_t> numbers) {
 
 PullOperator SenderRows::make_pull_operator() {
     const PointHierarchy& points = basis_.points();
+    const std::vector<Arrived> arrived = std::exchange(arrived_, {});
     std::vector<std::uint32_t> patches; // rows of the finest level in which rays were counted
-    for (const Arrived& arrived : arrived_)
-        patches.push_back(arrived.number);
+    for (const Arrived& a : arrived)
+        patches.push_back(a.number);
     const auto count = static_cast<Index>(patches.size());
     std::vector<std::vector<std::uint32_t>> seen(levels()); // number of each patch's row on a level
     for (int l = 0; l + 1 < levels(); ++l) {
@@ -220,7 +216,7 @@ PullOperator SenderRows::make_pull_operator() {
             for (const BasisEntry& entry : row(seen[l][p]))
                 if (entry.index >= points.begin(l))
                     sees[begin[entry.index - points.begin(l) + 1]++] =
-                        {p, static_cast<float>(arrived_[p].rays) * entry.value};
+                        {p, static_cast<float>(arrived[p].rays) * entry.value};
         ScratchPool<Accumulator<double>> sums(
             [&] { return std::make_unique<Accumulator<double>>(points.end(l + 1), 0.0); });
         parallel_ranges(points.end(l) - points.begin(l), 64, [&](Index first, Index last) {
@@ -274,8 +270,7 @@ std::vector<float> SenderRows::finest_areas() const {
             continue;
         }
         const std::uint32_t second = second_.at(number);
-        const double counted = rays_at(number) + rays_at(second);
-        const double share = counted > 0.0 ? rays_at(second) / counted : 0.0;
+        const double share = second_rows_[second - is_cut_.size()].share;
         add(number, (1.0 - share) * grid.area(patch));
         add(second, share * grid.area(patch));
     }

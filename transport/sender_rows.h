@@ -59,7 +59,7 @@ public:
     /// The pull between the levels. Its integrals run over the patches of the finest level, each
     /// weighted with the rays that were counted there: it is the light that arrives at the receivers
     /// which is the same on every level, not the light that leaves, of which some is never seen.
-    /// Not to be called concurrently.
+    /// To be called once: what was counted is forgotten, for it takes memory.
     PullOperator make_pull_operator();
     /// <B_j, 1> of the finest level's functions [world^2], over the patches of which rows were made:
     /// those that are seen.
@@ -81,7 +81,11 @@ private:
     std::vector<std::uint32_t> place_;  // no_index: not made
     std::vector<bool> is_cut_;                                      // a first row each
     std::unordered_map<std::uint32_t, std::uint32_t> second_;       // rows of patches that are cut
-    std::vector<std::uint8_t> second_level_;                        // a second row each
+    struct Second {
+        int level;
+        double share; // of the rays counted at the patch
+    };
+    std::vector<Second> second_rows_; // numbers above all first ones, rising
     std::unordered_map<std::uint32_t, Hit> centre_;                 // where it is not the patch's own
     std::vector<Arrived> arrived_; // rays counted, of the finest level's rows that any arrive at, numbers rising
     std::vector<std::uint32_t> begin_{0}; // of a place's entries, and the end of all
@@ -92,7 +96,6 @@ private:
     Hit centre(std::uint32_t number) const;
     bool hidden(const SurfacePoint& x, const SurfacePoint& centre, float relief) const;
     std::uint32_t side_of(const Hit& hit, std::uint32_t first) const;
-    std::uint32_t rays_at(std::uint32_t number) const; // that were counted
 };
 
 /// Appends the row of a finest level at any hit, not at a patch's centre; none where evaluate_or_nearest
