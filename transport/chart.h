@@ -47,7 +47,7 @@ struct ChartSetting {
 ///     spacing   value = coarse_scale: the spacing by hand
 ///     target    value = target error: the spacing by precompute_to_target()
 ///     path      value = paths a place: the path tracer, with connections; its seconds are those of a
-///               picture of 1280 x 720 pixels under one light
+///               picture of 1280 x 720 pixels under one light, at best
 ///     paper     value = epsilon pi, as printed: the operator of Lehtinen et al.
 ///     dense     value = coarse_scale; every link is kept
 ///     flat      value = share of R_0: one level of senders, one of receivers half as far apart
