@@ -1,5 +1,6 @@
 #include "basis/openness.h"
 #include "core/embree.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "core/peak_memory.h"
 #include "core/sampling.h"
@@ -214,6 +215,7 @@ void run_update(const UpdateOptions& options) {
                 squares += std::pow(static_cast<double>(field[k]) - anew[k], 2);
                 size += std::pow(static_cast<double>(anew[k]), 2);
             }
+            if (size == 0.0) throw Error("the light lights nothing that reflects: choose another --from");
             difference = std::sqrt(squares / size);
         }
         if (frame == 0) {
