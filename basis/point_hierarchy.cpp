@@ -3,7 +3,6 @@
 #include "basis/morton.h"
 #include "basis/nearest_points.h"
 #include "core/parallel.h"
-#include "core/sampling.h"
 
 #include <algorithm>
 #include <chrono>

@@ -60,7 +60,6 @@ struct HierarchyOptions {
     BasisShape shape = {};
     bool skip_narrow = true; // on every level but an openness level
     int candidates_per_point = PoissonDiskOptions{}.candidates_per_point;
-    std::uint64_t seed = 1;
     std::function<void(double)> progress = {}; // is told the share of the work that is done
 };
 

@@ -1,6 +1,7 @@
 #include "basis/poisson_disk.h"
 
 #include "basis/morton.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "core/sampling.h"
 
@@ -375,6 +376,9 @@ private:
 } // namespace
 
 PoissonDisk poisson_disk(CandidateSource& source, const PoissonDiskOptions& options) {
+    if (!(options.spacing > 8.0f * source.surface().lift())) // nor would cells fit their numbers
+        throw UsageError("functions that close to each other cannot be told apart in this scene; "
+                         "give a wider --coarse-radius or fewer levels");
     DartBoard board(source.surface(), options);
     const bool by_openness = options.openness_density > 0.0f;
     PoissonDisk disk;

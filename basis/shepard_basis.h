@@ -23,7 +23,7 @@ using BasisEntry = SparseEntry<float>; // a function and B_j(x)
 ///
 /// o_j: on levels placed by openness, 10^-3 + openness_likeness() of x and the function's centre: in
 /// a contact only what is in the contact too counts. x is probed where the functions that reach it
-/// differ among themselves; else o_j = 1.
+/// differ among themselves, or something lies within R / 2 above it; else o_j = 1.
 ///
 /// v_j: 1, or 0 where something stands between x and the function's centre, so that light does not
 /// leak through walls however thin. Where functions in sight have less than a hundredth of the

@@ -27,6 +27,7 @@ endforeach()
 add_custom_target(manual ALL DEPENDS ${written})
 
 install(FILES README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/afterglow COMPONENT programs)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/afterglow COMPONENT programs PATTERN example EXCLUDE)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/afterglow RENAME copyright COMPONENT programs)
 
 # ---- libraries and headers
@@ -39,7 +40,7 @@ foreach(library core basis transport)
         FILES_MATCHING PATTERN "*.h"
         PATTERN "embree.h" EXCLUDE # of surface.cpp alone
         PATTERN "command_*" EXCLUDE PATTERN "cli_options.h" EXCLUDE # of the programs
-        PATTERN "manual.h" EXCLUDE PATTERN "processor.h" EXCLUDE)
+        PATTERN "manual.h" EXCLUDE PATTERN "processor.h" EXCLUDE PATTERN "program.h" EXCLUDE)
 endforeach()
 # Headers name each other as "core/scene.h".
 target_include_directories(afterglow_core${portable} INTERFACE
@@ -54,7 +55,7 @@ configure_package_config_file(cmake/AfterglowConfig.cmake.in ${CMAKE_BINARY_DIR}
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/AfterglowConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/AfterglowConfig.cmake ${CMAKE_BINARY_DIR}/AfterglowConfigVersion.cmake
     DESTINATION ${package} COMPONENT development)
-install(DIRECTORY docs/example DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/afterglow COMPONENT development)
+install(DIRECTORY docs/example DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/afterglow/docs COMPONENT development)
 
 # ---- Debian packages: `cpack -G DEB`
 set(CPACK_PACKAGE_NAME afterglow)

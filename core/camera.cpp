@@ -15,9 +15,10 @@ constexpr int largest_side = 1 << 16; // pixels; more is a slip of the keyboard
 } // namespace
 
 void Camera::check() const {
-    if (!position.allFinite() || !target.allFinite() || !up.allFinite()
-        || !std::isfinite(vertical_fov))
-        throw UsageError("camera: position, target, up and field of view must be finite numbers");
+    if (!is_reachable(position) || !is_reachable(target))
+        throw UsageError("camera: position and target must be within 1e12 of the origin");
+    if (!up.allFinite() || !std::isfinite(vertical_fov))
+        throw UsageError("camera: up and field of view must be finite numbers");
     if (width < 1 || height < 1 || width > largest_side || height > largest_side)
         throw UsageError("camera: a picture of " + std::to_string(width) + "x"
                          + std::to_string(height) + " pixels is impossible; give 1 to "

@@ -14,6 +14,7 @@
 #include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <system_error>
 #include <unistd.h>
 #include <utility>
 
@@ -166,6 +167,12 @@ void write_atomically(const std::string& path, const std::function<void(OutputFi
 
 void write_file(const std::string& path, std::string_view content) {
     write_atomically(path, [&](OutputFile& file) { file.write(std::as_bytes(std::span(content))); });
+}
+
+void make_folder(const std::string& path) {
+    std::error_code failure;
+    std::filesystem::create_directories(path, failure);
+    if (failure) throw FileError(path, "cannot be made: " + failure.message());
 }
 
 MappedFile::MappedFile(const std::string& path) {

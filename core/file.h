@@ -33,6 +33,9 @@ void write_atomically(const std::string& path, const std::function<void(OutputFi
 /// Writes a file that is in memory, whole or not at all. Throws FileError.
 void write_file(const std::string& path, std::string_view content);
 
+/// Makes a folder, and those it lies in, where it is not there. Throws FileError.
+void make_folder(const std::string& path);
+
 /// A whole file, mapped read-only. Throws FileError.
 class MappedFile {
 public:

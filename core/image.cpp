@@ -138,17 +138,18 @@ std::string encode_png(const Image& image, std::optional<float> key) {
 
 } // namespace
 
+void check_picture_name(const std::string& path) {
+    if (!path.ends_with(".exr") && !path.ends_with(".png"))
+        throw UsageError(path + ": a picture's name must end in .exr or .png");
+}
+
 void write_image(const std::string& path, const Image& image, PixelType type,
                  std::optional<float> exposure) {
     assert(image.width > 0 && image.height > 0 && image.rgb.size() == 3 * pixel_count(image));
     std::string encoded;
     try {
-        if (path.ends_with(".exr"))
-            encoded = encode_exr(image, type);
-        else if (path.ends_with(".png"))
-            encoded = encode_png(image, exposure);
-        else
-            throw UsageError(path + ": a picture's name must end in .exr or .png");
+        check_picture_name(path);
+        encoded = path.ends_with(".exr") ? encode_exr(image, type) : encode_png(image, exposure);
     } catch (const Error&) {
         throw;
     } catch (const std::bad_alloc&) {

@@ -33,6 +33,9 @@ enum class PixelType { half_float, full_float };
 void write_image(const std::string& path, const Image& image, PixelType type,
                  std::optional<float> exposure = 0.18f);
 
+/// Throws UsageError where write_image() would, for its extension.
+void check_picture_name(const std::string& path);
+
 /// Writes a PNG file of bytes as they are, R, G, B each, rows from the top. Throws FileError.
 void write_png_bytes(const std::string& path, int width, int height, std::span<const unsigned char> rgb);
 

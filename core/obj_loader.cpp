@@ -24,6 +24,7 @@
 #include <sstream>
 #include <streambuf>
 #include <string_view>
+#include <unordered_map>
 
 namespace afterglow {
 namespace {
@@ -280,6 +281,8 @@ struct Collector {
     const std::string& path;
     const std::vector<MaterialSource>& sources;
     int material = -1;
+    std::unordered_map<std::string, int> trimmed_names = {}; // of the first `named` sources
+    std::size_t named = 0;
 
     void check_count(std::size_t count) const {
         if (count >= most_indices)
@@ -306,9 +309,10 @@ struct Collector {
     void use_material(std::string_view name, int id) {
         material = id;
         if (material >= 0) return;
-        const std::string_view wanted = trimmed(name);
-        for (std::size_t i = 0; i < sources.size() && material < 0; ++i)
-            if (sources[i].material.name == wanted) material = static_cast<int>(i);
+        for (; named < sources.size(); ++named)
+            trimmed_names.emplace(sources[named].material.name, static_cast<int>(named));
+        if (const auto found = trimmed_names.find(std::string(trimmed(name))); found != trimmed_names.end())
+            material = found->second;
     }
 };
 
@@ -350,10 +354,6 @@ RawObj parse(const std::string& path, SceneSummary& summary) {
 
 // ---- From faces to a scene
 // --------------------------------------------------------------------------
-
-bool usable(const Vec3& p) {
-    return (p.array().abs() <= largest_coordinate).all();
-}
 
 /// Neither a line nor a point, as seen from its own size, and with a normal that fits a float.
 bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -418,7 +418,7 @@ private:
             raw_.normals[i] = normal_usable_[i] ? unit : Vec3(Vec3::UnitY());
         }
         for (Vec2& uv : raw_.texture_coordinates) {
-            texture_usable_.push_back(uv.allFinite());
+            texture_usable_.push_back(is_reachable(uv));
             if (!texture_usable_.back()) uv.setZero();
         }
     }
@@ -437,7 +437,7 @@ private:
             }
             polygon_.push_back(raw_.positions[c.position]);
         }
-        if (!std::all_of(polygon_.begin(), polygon_.end(), usable)) {
+        if (!std::all_of(polygon_.begin(), polygon_.end(), is_reachable)) {
             summary.dropped_not_finite += corner.size() - 2;
             return;
         }

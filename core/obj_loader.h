@@ -6,9 +6,6 @@
 
 namespace afterglow {
 
-/// Of a vertex. Embree's limit, beyond which it ends the process; cross products still fit a float.
-inline constexpr float largest_coordinate = 1e18f;
-
 /// Loads a Wavefront OBJ file with its MTL files, map_Kd textures and normal maps; lines, points and
 /// free-form surfaces are ignored. A normal map is what `norm` names, or else `map_Bump` or `bump`; the
 /// latter two are heights, times -bm, unless they look like normals (see normal_map.h). Pictures are
@@ -16,7 +13,7 @@ inline constexpr float largest_coordinate = 1e18f;
 /// Faults that leave a usable scene are mended and told in `summary`:
 ///  - polygons are cut into triangles, concave ones too; triangles of zero area, with a vertex
 ///  index
-///    outside the list, or with a coordinate that is no number or beyond 1e18 are dropped;
+///    outside the list, or with a coordinate that is no number or beyond 1e12 are dropped;
 ///  - a triangle with an unusable normal loses its three normals, likewise texture coordinates;
 ///  - a material that is missing is a grey of 0.5, a reflectance is clamped to [0, 0.999], a
 ///  texture

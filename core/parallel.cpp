@@ -54,6 +54,10 @@ ThreadLimit::ThreadLimit(int threads)
           tbb::global_control::max_allowed_parallelism,
           static_cast<std::size_t>(threads > 0 ? threads : tbb::this_task_arena::max_concurrency()))) {}
 
+void isolated(const std::function<void()>& work) {
+    tbb::this_task_arena::isolate(work);
+}
+
 ThreadLimit::~ThreadLimit() { delete static_cast<tbb::global_control*>(control_); }
 
 int thread_count() {

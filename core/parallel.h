@@ -34,6 +34,10 @@ int thread_count();
 /// Denormals are flushed to zero inside. An exception of any body is thrown again here.
 void parallel_ranges(Index count, Index grain, const std::function<void(Index, Index)>& body);
 
+/// Does work that has parallel loops of its own and that other threads wait for (a lock, a once_flag): a
+/// thread that waits for such a loop to end takes up nothing from outside it, which might wait in turn.
+void isolated(const std::function<void()>& work);
+
 /// Calls body(i) for each i in [0, count); each call owns the slot i of whatever it writes.
 template <class Body>
 void parallel_for(Index count, const Body& body, Index grain = 64) {

@@ -47,6 +47,7 @@ public:
         }
         // Enough for any sensible face; a monstrous one must not take quadratic time and more.
         tests_left_ = 8 * point_.size() * std::min<std::size_t>(point_.size(), 256);
+        refusals_left_ = point_.size() * std::min<std::size_t>(point_.size(), 2048);
     }
 
     void clip(std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -55,9 +56,10 @@ public:
         while (left > 3) {
             // Once all corners were refused the polygon crosses itself: any cut is as good as
             // another.
-            if (refused < left && !is_ear(at)) {
+            if (refused < left && refusals_left_ > 0 && !is_ear(at)) {
                 at = next_[at];
                 ++refused;
+                --refusals_left_;
                 continue;
             }
             const std::uint32_t before = previous_[at], after = next_[at];
@@ -90,7 +92,7 @@ private:
 
     std::vector<Point> point_;
     std::vector<std::uint32_t> next_, previous_;
-    std::size_t tests_left_;
+    std::size_t tests_left_, refusals_left_; // of corners on an edge, which take no tests
 };
 
 /// True where the diagonal from corner 0 to corner 2 lies inside a quadrilateral.

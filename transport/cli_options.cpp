@@ -6,6 +6,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <string_view>
 
 namespace afterglow {
@@ -62,6 +63,10 @@ CLI::Option* add_number(CLI::App& command, const std::string& option, double& va
             [option, &value](const std::string& text) {
                 if (!parse(text, value) || !std::isfinite(value))
                     throw UsageError(option + " must be a finite number, not '" + printable(text) + "'");
+                const double size = std::abs(value);
+                if (size > std::numeric_limits<float>::max()
+                    || (size > 0.0 && size < std::numeric_limits<float>::min()))
+                    throw UsageError(option + " must be 0 or between 1.2e-38 and 3.4e38 in size, not '" + printable(text) + "'");
             },
             help)
         ->type_name("NUMBER");

@@ -16,7 +16,8 @@ namespace afterglow {
 /// Exactly `count` finite numbers separated by commas. Throws UsageError that names the option.
 Eigen::VectorXf parse_numbers(const std::string& option, const std::string& text, int count);
 
-/// An option whose value is one finite number; 1e400, nan and trailing letters are errors.
+/// An option whose value is one finite number that is no more a zero or infinite as a float: 1e-60, 1e39, nan
+/// and trailing letters are errors.
 CLI::Option* add_number(CLI::App& command, const std::string& option, double& value,
                         const std::string& help);
 

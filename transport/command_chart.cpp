@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -37,11 +38,17 @@ struct ChartCommand {
     RunOptions run;
 };
 
-Json point_json(const std::string& scene, const std::string& hash, const ChartPoint& p) {
+/// What a search was limited to [s]; 0: by nothing, or no search.
+double limit_of(const ChartSetting& setting) {
+    return setting.target && std::isfinite(setting.most_seconds) ? setting.most_seconds : 0.0;
+}
+
+Json point_json(const std::string& scene, const std::string& hash, const ChartSetting& setting, const ChartPoint& p) {
     return {{"scene", scene},
             {"scene_hash", hash},
             {"sweep", p.sweep},
             {"value", p.value},
+            {"max_time", limit_of(setting)},
             {"seconds", p.seconds},
             {"update_seconds", p.update_seconds},
             {"bytes", p.bytes},
@@ -107,12 +114,15 @@ public:
                 throw UsageError(path + " was made with another value of '" + key + "'; name another folder");
         runs_ = json["runs"];
     }
-    /// The point, if it is there.
+    /// The point, if it is there. Throws UsageError where it was searched with another limit.
     const Json* find(const std::string& scene, const ChartSetting& setting) const {
         for (const Json& run : runs_)
             if (run.value("scene", "") == scene && run.value("sweep", "") == setting.sweep
-                && run.value("value", -1.0) == setting.value)
+                && run.value("value", -1.0) == setting.value) {
+                if (run.value("max_time", 0.0) != limit_of(setting))
+                    throw UsageError(file() + " has targets searched with another --max-time; name another folder");
                 return &run;
+            }
         return nullptr;
     }
     /// Throws UsageError where points of another scene go by this name.
@@ -196,7 +206,7 @@ void measure_scene(const ChartCommand& command, const std::string& path, Runs& r
     for (const ChartSetting& setting : settings) {
         if (!runs.find(name, setting)) {
             const ChartPoint point = bench.measure(setting);
-            runs.add(point_json(name, hash, point));
+            runs.add(point_json(name, hash, setting, point));
             if (!command.run.quiet)
                 std::fprintf(stderr, "%s: %s %g: error %.1f %% +- %.1f, %s, %.1f MB\n", name.c_str(),
                              setting.sweep.c_str(), setting.value, 100.0 * point.error.rel_rmse,
@@ -222,7 +232,7 @@ void draw(const ChartCommand& command) {
     quoted += "'";
     // The system's own Python too, as another in front of it may lack matplotlib.
     const std::string line = "for python in python3 /usr/bin/python3; do if $python -c 'import matplotlib' 2>/dev/null; "
-                             "then exec $python " + quoted + "; fi; done; exit 1";
+                             "then exec $python " + quoted + " 2>/dev/null; fi; done; exit 1";
     if (std::system(line.c_str()) != 0)
         throw Error("the figures could not be drawn; with matplotlib installed, run python3 " + program);
 }
@@ -230,9 +240,7 @@ void draw(const ChartCommand& command) {
 void run(const ChartCommand& command) {
     if (!(command.max_time > 0.0)) throw UsageError("--max-time must be positive");
     const ThreadLimit limit(command.run.threads);
-    std::error_code failed;
-    std::filesystem::create_directories(command.output, failed);
-    if (failed) throw FileError(command.output, failed.message());
+    make_folder(command.output);
     Runs runs(command.output, command.brief, command.run);
     for (const std::string& scene : command.scenes) measure_scene(command, scene, runs);
     draw(command);

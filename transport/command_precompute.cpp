@@ -263,9 +263,8 @@ void open_checkpoint(const PrecomputeCommand& command, TransferProvenance asked,
 }
 
 void run(PrecomputeCommand& command) {
-    check_output(command.output);
-    if (!command.report.empty()) check_output(command.report);
-    if (!command.checkpoint.empty()) check_output(command.checkpoint);
+    check_outputs({command.output, command.report, command.checkpoint}, {command.scene});
+    check_scene_name(command.scene);
     const ThreadLimit limit(command.run.threads);
     OuterSeconds outer;
     const auto start = Clock::now();
@@ -363,8 +362,6 @@ void fill_options(PrecomputeCommand& command, const CLI::App& sub) {
                          "--max-memory they depend on the run");
     if (given("--checkpoint") && command.operator_name == "paper")
         throw UsageError("--operator paper is made in one go; it knows no --checkpoint");
-    if (given("--checkpoint") && (command.checkpoint == command.output || command.checkpoint == command.report))
-        throw UsageError("--checkpoint needs a file of its own");
     if (given("--checkpoint-every") && !(command.checkpoint_every >= 0.0))
         throw UsageError("--checkpoint-every must not be negative");
     command.tuned = limited || (given("--target-error") && !given("--coarse-radius"));

@@ -23,7 +23,7 @@ struct QueryCommand {
 
 void run(QueryCommand& command) {
     command.light.check();
-    check_output(command.output);
+    check_outputs({command.output}, {command.file, command.points, command.scene});
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
     if (!command.run.quiet) tell_of_outside_files(opened.scene);

@@ -91,7 +91,10 @@ void run(ReferenceCommand& command, bool has_camera) {
         if (!has_camera)
             throw UsageError("reference needs --camera-position and --camera-target, or --points");
         command.camera.check();
+        check_picture_name(command.output);
     }
+    check_outputs({command.output, command.report}, {command.scene, command.points});
+    check_scene_name(command.scene);
     const ThreadLimit limit(command.run.threads);
     const Scene scene = load_scene(command.scene);
     if (const std::string line = scene.summary.line(); !line.empty() && !command.run.quiet)

@@ -53,7 +53,8 @@ void run(RenderCommand& command) {
     const Layer layer = layer_from_name(command.layer);
     command.light.check();
     command.camera.check();
-    check_output(command.output);
+    check_outputs({command.output}, {command.file, command.scene});
+    check_picture_name(command.output);
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
     if (!command.run.quiet) tell_of_outside_files(opened.scene);

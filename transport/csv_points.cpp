@@ -80,8 +80,10 @@ void read_points(const std::string& path, const Use& use) {
         const Vec3 unit = normal.stableNormalized();
         if (!(std::abs(unit.norm() - 1.0f) < 1e-3f))
             throw FileError(path, where + "the normal must not be zero");
+        const Vec3 position(row[0], row[1], row[2]);
+        if (!is_reachable(position)) throw FileError(path, where + "the position must be within 1e12 of the origin");
         any = true;
-        use(SurfacePoint{Vec3(row[0], row[1], row[2]), unit});
+        use(SurfacePoint{position, unit});
     });
     if (!any) throw FileError(path, "holds no points");
 }

@@ -88,7 +88,9 @@ const NearestPoints& DirectLight::nearest() const {
 }
 
 const ShepardBasis& DirectLight::basis() const {
-    std::call_once(basis_made_, [&] { basis_ = std::make_unique<ShepardBasis>(points_, surface_, true, level_); });
+    std::call_once(basis_made_, [&] { // by a thread of a parallel loop
+        isolated([&] { basis_ = std::make_unique<ShepardBasis>(points_, surface_, true, level_); });
+    });
     return *basis_;
 }
 

@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
     CLI::App app("Precomputed direct-to-indirect light transport", "afterglow");
     app.set_version_flag("--version", AFTERGLOW_VERSION);
     afterglow::add_manual_options(app, manual);
-    app.require_subcommand(1);
+    app.require_subcommand(0, 1); // an unknown one is told as what was not expected
     afterglow::add_precompute_command(app);
     afterglow::add_render_command(app);
     afterglow::add_query_command(app);
@@ -37,5 +37,7 @@ int main(int argc, char** argv) {
     afterglow::add_reference_command(app);
     afterglow::add_compare_command(app);
     afterglow::add_chart_command(app);
-    return afterglow::run_program(app, argc, argv);
+    return afterglow::run_program(app, argc, argv, [&] {
+        if (app.get_subcommands().empty()) throw CLI::RequiredError("A subcommand");
+    });
 }

@@ -81,7 +81,7 @@ void MovingLight::unpack_display_links() {
     const Index count = static_cast<Index>(transfer.points.size()) - first;
     display_begin_.resize(static_cast<std::size_t>(count + 1));
     parallel_for(count, [&](Index k) {
-        display_begin_[static_cast<std::size_t>(k + 1)] = static_cast<std::uint32_t>(transfer.links.count(first + k, first + k + 1));
+        display_begin_[static_cast<std::size_t>(k + 1)] = transfer.links.count(first + k, first + k + 1);
     }, 4096);
     for (std::size_t k = 1; k < display_begin_.size(); ++k) display_begin_[k] += display_begin_[k - 1];
     display_links_.resize(display_begin_.back());
@@ -144,13 +144,13 @@ void MovingLight::push_display() {
     std::vector<Chunk> chunks(static_cast<std::size_t>((count + grain - 1) / grain));
     parallel_ranges(count, grain, [&](Index begin, Index end) {
         Chunk& chunk = chunks[static_cast<std::size_t>(begin / grain)];
-        const std::uint32_t* const begins = display_begin_.data();
+        const std::uint64_t* const begins = display_begin_.data();
         const DisplayLink* const links = display_links_.data();
         const float* const coefficients = coefficients_.data();
         for (Index k = begin; k < end; ++k) {
             const Index i = first + k;
             Eigen::Vector4f x = Eigen::Vector4f::Zero(), y = x, z = x;
-            for (std::uint32_t e = begins[k]; e < begins[k + 1]; ++e) {
+            for (std::uint64_t e = begins[k]; e < begins[k + 1]; ++e) {
                 const LinkVector link = Links::vector_of(links[e].bits);
                 const Eigen::Vector4f c = Eigen::Vector4f::Map(coefficients + 4 * std::size_t{links[e].sender});
                 x += link.x() * c;

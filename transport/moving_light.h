@@ -69,7 +69,7 @@ private:
     struct DisplayLink {
         std::uint32_t sender, bits; // the latter as of a PackedLink
     };
-    std::vector<std::uint32_t> display_begin_; // of a display point each, and the end; empty before the first pose
+    std::vector<std::uint64_t> display_begin_; // of a display point each, and the end; empty before the first pose
     std::vector<DisplayLink> display_links_;
     std::vector<float> coefficients_;        // the newest
     std::vector<Eigen::Vector4f> product_;   // T c: three a receiver, x, y, z; R, G, B, 0 each

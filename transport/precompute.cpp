@@ -39,7 +39,6 @@ float finer_for_few_surfaces(CandidateSource& source, float coarse_radius, int r
 
 HierarchyOptions hierarchy_options(const PrecomputeOptions& options, CandidateSource& source) {
     HierarchyOptions hierarchy;
-    hierarchy.seed = options.seed;
     if (options.progress)
         hierarchy.progress = [&](double share) { options.progress(points_share * share); };
     hierarchy.coarse_radius = options.coarse_radius;
@@ -149,8 +148,10 @@ void check(const PrecomputeOptions& options) {
         throw UsageError("--receiver-levels must lie between 2 and 10");
     if (options.sender_levels < 1 || options.sender_levels > 10)
         throw UsageError("--sender-levels must lie between 1 and 10");
-    if (!(options.coarse_radius >= 0.0f) || !std::isfinite(options.coarse_radius))
-        throw UsageError("--coarse-radius must be positive");
+    if (!(options.coarse_radius >= 0.0f && options.coarse_radius <= largest_coordinate))
+        throw UsageError("--coarse-radius must be positive, and 1e12 at most");
+    if (options.viewpoint && !is_reachable(*options.viewpoint))
+        throw UsageError("--viewpoint must be within 1e12 of the origin");
     const int rays = options.links.rays;
     if (rays < 16 || rays > 32768 || !std::has_single_bit(static_cast<unsigned>(rays)))
         throw UsageError("--rays must be a power of two between 16 and 32768");

@@ -26,7 +26,8 @@ void finish_stdout() {
 
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& work) {
     const auto fail = [&](const char* what, int status, const char* remedy = "") {
-        std::fprintf(stderr, "%s: %s%s\n", app.get_name().c_str(), what, remedy);
+        const std::string line = printable(what, std::string::npos);
+        std::fprintf(stderr, "%s: %s%s\n", app.get_name().c_str(), line.c_str(), remedy);
         return status;
     };
     try {

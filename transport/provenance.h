@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 namespace afterglow {
 
@@ -13,8 +14,12 @@ std::string number_text(double value);
 /// A light as string attributes of a picture: afterglow.light_position ...
 std::map<std::string, std::string> light_attributes(const Spotlight& light);
 
-/// Throws FileError where no file of this name can be made because its folder is missing or may not
-/// be written to, so that a long computation does not end there.
-void check_output(const std::string& path);
+/// Before a long computation: throws FileError where an output cannot be made because its folder is
+/// missing or may not be written to, UsageError where two of the outputs, or an output and an input, are
+/// one file, or where the first output has no name. Other empty names, and devices, are nobody's.
+void check_outputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
+
+/// Throws UsageError where a scene's name is not UTF-8, which neither transfer files nor reports can hold.
+void check_scene_name(const std::string& scene);
 
 } // namespace afterglow

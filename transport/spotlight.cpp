@@ -9,9 +9,10 @@
 namespace afterglow {
 
 void Spotlight::check() {
-    if (!position.allFinite() || !direction.allFinite() || !intensity.allFinite()
+    if (!is_reachable(position)) throw UsageError("a spotlight's position must be within 1e12 of the origin");
+    if (!direction.allFinite() || !intensity.allFinite()
         || !std::isfinite(inner_angle) || !std::isfinite(outer_angle))
-        throw UsageError("a spotlight's position, direction, cone and intensity must be finite");
+        throw UsageError("a spotlight's direction, cone and intensity must be finite");
     if (!(inner_angle >= 0.0f && inner_angle <= outer_angle && outer_angle > 0.0f
           && outer_angle <= 180.0f))
         throw UsageError("a spotlight's cone must satisfy 0 <= inner <= outer <= 180 and outer > 0 "

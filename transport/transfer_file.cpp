@@ -130,7 +130,7 @@ private:
             return std::all_of(values.begin(), values.end(), good);
         };
         // Rays start at points, lifted by a share of their support.
-        const auto reachable = [](float x) { return std::abs(x) <= largest_coordinate; }; // false for NaN
+        const auto reachable = [](float x) { return std::abs(x) <= largest_coordinate; };
         const auto positive = [](float x) { return x > 0.0f && x <= largest_coordinate; };
         if (!all(spacing, positive)) fail("has a spacing that is not positive or too large");
         if (!all(position, reachable)) fail("has a point at no position that a scene can have");

@@ -34,6 +34,7 @@ std::uint64_t verification_rays(const PrecomputeReport& report) {
 double order_of(const std::vector<TuningStep>& steps) {
     if (steps.size() < 2) return expected_order;
     const TuningStep &a = steps[steps.size() - 2], &b = steps.back();
+    if (!(a.error.certain > 0.0 && b.error.certain > 0.0)) return expected_order; // noise alone
     const double order = std::log(a.error.certain / b.error.certain)
                          / std::log(static_cast<double>(a.coarse_scale / b.coarse_scale));
     return std::clamp(order, 0.5, 1.2);

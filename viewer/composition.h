@@ -28,6 +28,7 @@ const char* view_layer_name(ViewLayer layer);
 ViewLayer view_layer_from_name(std::string_view name);
 /// Reflectance and normals are numbers between 0 and 1, to be shown as they are.
 inline bool is_light(ViewLayer layer) { return layer < ViewLayer::reflectance; }
+inline bool has_indirect_light(ViewLayer layer) { return is_light(layer) && layer != ViewLayer::direct; }
 
 /// The last passes: from irradiances and a geometry buffer to a picture in linear light, and from that
 /// to what a screen shows.

@@ -13,13 +13,13 @@ Gl::Gl(const Lookup& lookup) {
     GLint major = 0, minor = 0;
     GetIntegerv(GL_MAJOR_VERSION, &major);
     GetIntegerv(GL_MINOR_VERSION, &minor);
-    version_ = 10 * major + minor;
-    if (version_ < 33)
+    const int version = 10 * major + minor;
+    if (version < 33)
         throw Error("OpenGL " + std::to_string(major) + "." + std::to_string(minor)
                     + " is too old; 3.3 is the least that will do");
-    if (version_ >= 45)
+    if (version >= 45)
         ClipControl = reinterpret_cast<PFNGLCLIPCONTROLPROC>(lookup("glClipControl"));
-    if (version_ >= 43)
+    if (version >= 43)
         if (const auto callback = reinterpret_cast<PFNGLDEBUGMESSAGECALLBACKPROC>(
                 lookup("glDebugMessageCallback"))) {
             Enable(GL_DEBUG_OUTPUT);

@@ -54,12 +54,10 @@ struct Gl {
     Gl& operator=(const Gl&) = delete;
 
     std::string renderer() const; // the driver's name for itself
-    int version() const { return version_; } // 10 major + minor
     /// What went wrong since the context was made, in the driver's words; empty when all is well.
     const std::vector<std::string>& errors() const;
 
 private:
-    int version_ = 0;
     mutable std::vector<std::string> errors_;
     static void APIENTRY report(GLenum source, GLenum type, GLuint id, GLenum severity,
                                 GLsizei length, const GLchar* message, const void* gl);

@@ -73,9 +73,7 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
         frame.camera.height = options.height;
         frame.camera.check();
     }
-    std::error_code failure;
-    std::filesystem::create_directories(options.folder, failure);
-    if (failure) throw FileError(options.folder, "cannot be made: " + failure.message());
+    make_folder(options.folder);
 
     const std::unique_ptr<GlContext> context = make_offscreen_context(options.context);
     Renderer renderer(context->gl(), scene, options.method);

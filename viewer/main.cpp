@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "core/file.h"
 #include "core/parallel.h"
 #include "transport/cli_options.h"
 #include "transport/manual.h"
@@ -58,8 +59,10 @@ void add_options(CLI::App& app, ViewCommand& command) {
         ->check(CLI::Range(0, 4096));
 }
 
-void open_window(const ViewCommand& command) {
+void open_window(const CLI::App& app, const ViewCommand& command) {
     const HeadlessOptions& frames = command.frames;
+    for (const char* option : {"--format", "--samples", "--seconds"})
+        if (app.count(option) > 0) throw UsageError(std::string(option) + " is of --headless");
     if (frames.context != "auto" && frames.context != "glfw")
         throw UsageError("--context " + frames.context + " has no window; give --headless");
     ViewerOptions options;
@@ -71,11 +74,14 @@ void open_window(const ViewCommand& command) {
     options.width = frames.width;
     options.height = frames.height;
     options.exposure = frames.exposure;
-    if (!frames.folder.empty()) options.folder = frames.folder;
+    if (!frames.folder.empty()) {
+        make_folder(frames.folder);
+        options.folder = frames.folder;
+    }
     ViewerApp(options).run();
 }
 
-void run(ViewCommand& command) {
+void run(const CLI::App& app, ViewCommand& command) {
     if (!(command.exposure > 0.0)) throw UsageError("--exposure must be positive");
     HeadlessOptions& frames = command.frames;
     if (!(frames.seconds >= 0.0)) throw UsageError("--seconds must not be negative");
@@ -86,7 +92,7 @@ void run(ViewCommand& command) {
     frames.height = command.size.height;
     const ThreadLimit limit(command.threads);
     if (!command.headless) {
-        open_window(command);
+        open_window(app, command);
         return;
     }
     if (frames.frames.empty() || frames.folder.empty())
@@ -106,5 +112,5 @@ int main(int argc, char** argv) {
     add_manual_options(app, manual);
     ViewCommand command;
     add_options(app, command);
-    return run_program(app, argc, argv, [&] { run(command); });
+    return run_program(app, argc, argv, [&] { run(app, command); });
 }

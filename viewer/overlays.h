@@ -32,7 +32,6 @@ public:
     void set_light(const Spotlight& light);
     /// The function of a level closest to a place.
     void pick(int level, const SurfacePoint& x);
-    std::optional<std::uint32_t> picked() const { return picked_; }
 
     /// `pixels`: what the camera shows, to see what is hidden.
     void draw(ImDrawList& list, Overlay overlay, int level, const Camera& camera,

@@ -88,9 +88,8 @@ void Renderer::draw(const Camera& camera, ViewLayer layer, std::size_t most_new,
     timings_ = {};
     if (camera_ != camera || place != place_) draw_geometry(camera, place);
     const bool wants_direct = layer == ViewLayer::full || layer == ViewLayer::direct;
-    const bool wants_indirect = is_light(layer) && layer != ViewLayer::direct;
     if (field_ && wants_direct) draw_direct();
-    if (field_ && wants_indirect) {
+    if (field_ && has_indirect_light(layer)) {
         if (patches_are_old_ || patches_missing_ > 0) find_patches(most_new);
         if (indirect_is_old_) draw_indirect();
     }

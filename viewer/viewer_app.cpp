@@ -37,12 +37,18 @@ void remember(std::vector<float>& values, double seconds) {
 ViewerApp::ViewerApp(const ViewerOptions& options)
     : options_(options), window_(options.width, options.height, "Afterglow"), gui_(window_),
       layer_(options.layer), exposure_(options.exposure) {
+    if (!options.frames.empty()) path_ = read_frame_path(options.frames);
     connect_events();
     open(options.file);
     if (!session_ && !precompute_) throw Error(message_);
-    if (!options.frames.empty()) {
-        path_ = read_frame_path(options.frames);
-        playing_since_ = now();
+}
+
+template <class Work>
+void ViewerApp::attempt(const Work& work) {
+    try {
+        work();
+    } catch (const std::exception& error) {
+        message_ = error.what();
     }
 }
 
@@ -53,17 +59,16 @@ void ViewerApp::open(const std::string& path) {
             path, (std::filesystem::path(options_.folder) / file).string());
         return;
     }
-    try {
+    attempt([&] { // the window stays with what it has
         auto opened = std::make_unique<Session>(window_.gl(), path, session_ ? "" : options_.scene,
                                                 session_ ? session_->renderer.method() : options_.method);
+        if (!session_ && !path_.empty()) playing_since_ = now();
         session_ = std::move(opened);
         message_ = "opened " + path;
         window_.set_title("Afterglow - " + std::filesystem::path(path).filename().string());
         overlay_level_ = 0;
         picture_is_old_ = true;
-    } catch (const std::exception& error) { // the window stays with what it has
-        message_ = error.what();
-    }
+    });
 }
 
 void ViewerApp::set_light(const Spotlight& light) {
@@ -85,11 +90,7 @@ void ViewerApp::connect_events() {
         if (session_ && !ImGui::GetIO().WantCaptureMouse) on_wheel(static_cast<float>(steps), shift, control);
     };
     window_.events.drop = [this](const std::string& path) {
-        try {
-            open(path);
-        } catch (const std::exception& error) {
-            message_ = error.what();
-        }
+        attempt([&] { open(path); });
     };
 }
 
@@ -111,8 +112,8 @@ void ViewerApp::on_key(int key) {
         std::printf("%s\n", message_.c_str());
         std::fflush(stdout);
         break;
-    case GLFW_KEY_P: write_picture(); break;
-    case GLFW_KEY_R: toggle_recording(); break;
+    case GLFW_KEY_P: picture_wanted_ = true; break;
+    case GLFW_KEY_R: attempt([&] { toggle_recording(); }); break;
     case GLFW_KEY_SPACE:
         if (playing_since_)
             playing_since_.reset();
@@ -287,7 +288,7 @@ void ViewerApp::draw_picture() {
     if (tone_mapped_ && is_light(layer_)) tone_map_.emplace(renderer.read(), exposure_);
     times_.frame = renderer.timings();
     remember(frame_history_, times_.frame.total());
-    picture_is_old_ = renderer.patches_missing() > 0;
+    picture_is_old_ = has_indirect_light(layer_) && renderer.patches_missing() > 0;
 }
 
 void ViewerApp::step() {
@@ -351,8 +352,9 @@ void ViewerApp::draw_window() {
         draw_panels();
     }
     gui_.end();
-    if (screenshot_wanted_) write_screenshot(numbered("window", ".png"));
-    screenshot_wanted_ = false;
+    if (picture_wanted_) attempt([&] { write_picture(); });
+    if (screenshot_wanted_) attempt([&] { write_screenshot(numbered("window", ".png")); });
+    picture_wanted_ = screenshot_wanted_ = false;
     window_.swap();
 }
 

@@ -53,7 +53,7 @@ private:
     std::string message_; // the last thing to tell
     bool picture_is_old_ = true;
     std::size_t most_new_ = 2000; // patches a picture, so that it takes about most_patch_seconds
-    bool screenshot_wanted_ = false;
+    bool picture_wanted_ = false, screenshot_wanted_ = false; // to be written when they are drawn
 
     // What the person does.
     Drag drag_ = Drag::none;
@@ -74,6 +74,8 @@ private:
     std::vector<float> frame_history_, light_history_;
 
     void open(const std::string& path);
+    template <class Work>
+    void attempt(const Work& work); // what fails is told in the window, which stays
     void set_light(const Spotlight& light);
     void connect_events();
     void on_key(int key);

@@ -107,7 +107,7 @@ TEST(ObjLoader, DropsFacesWithIndicesOutsideTheirList) {
 
 TEST(ObjLoader, DropsTrianglesWithCoordinatesThatAreNotFinite) {
     for (const char* odd : {"nan", "NaN", "-nan", "inf", "-inf", "infinity", "1e999", "-1e300",
-                            "1.#IND", "1.#QNAN", "abc", "1e19"}) {
+                            "1.#IND", "1.#QNAN", "abc", "1e13"}) {
         const Scene scene = load_text(square_corners + "v 0 " + odd + " 0\nv 0 0 " + odd
                                       + "\nf 1 2 3\nf 1 2 5\nf 1 2 3 6\n");
         expect_sound(scene);
@@ -126,7 +126,7 @@ TEST(ObjLoader, DropsTrianglesOfZeroArea) {
 }
 
 TEST(ObjLoader, JudgesAreaByATrianglesOwnSize) {
-    for (const char* size : {"1e-12", "1e-3", "1", "1e6", "1e15"}) {
+    for (const char* size : {"1e-12", "1e-3", "1", "1e6", "1e12"}) {
         const std::string s = size;
         const Scene scene = load_text("v 0 0 0\nv " + s + " 0 0\nv 0 " + s + " 0\nf 1 2 3\n");
         EXPECT_EQ(scene.triangles.size(), 1u) << s;
@@ -160,7 +160,7 @@ TEST(ObjLoader, NormalisesNormalsAndGivesUpUnusableOnes) {
 
 TEST(ObjLoader, GivesUpUnusableTextureCoordinates) {
     const Scene scene = load_text(square_corners
-                                  + "vt 0 0\nvt 1 0\nvt 1 1\nvt inf 0\n"
+                                  + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 3.4e38\n"
                                     "f 1/1 2/2 3/3\nf 1/1 2/2 3/4\nf 1/1 2/2 3/7\nf 1 2/2 3/3\n");
     expect_sound(scene);
     EXPECT_EQ(scene.texture_indices[0], (Triangle{0, 1, 2}));

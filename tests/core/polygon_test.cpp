@@ -113,6 +113,15 @@ TEST(Triangulate, GivesAllTrianglesForPolygonsThatCrossThemselvesOrHaveNoArea) {
     EXPECT_EQ(triangles.size(), 3u + 5u + 3u);
 }
 
+TEST(Triangulate, EndsSoonWhereAllCornersButThreeLieOnOneEdge) {
+    constexpr int corners = 300'000;
+    Polygon flat = {{0, 1, 0}};
+    for (int i = 0; i < corners; ++i) flat.emplace_back(static_cast<float>(i), 0.0f, 0.0f);
+    std::vector<std::array<std::uint32_t, 3>> triangles;
+    triangulate(flat, triangles);
+    EXPECT_EQ(triangles.size(), flat.size() - 2);
+}
+
 TEST(Triangulate, EndsSoonOnAMonstrousPolygon) {
     Rng rng(2, 0);
     Polygon scribble;

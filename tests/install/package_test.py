@@ -42,7 +42,7 @@ def public_headers_stand_alone(prefix, folder):
 
 def example(prefix, folder, flags):
     """What the example prints, as name -> three numbers."""
-    output(cmake, "-G", "Ninja", "-S", prefix / "share/doc/afterglow/example", "-B", folder,
+    output(cmake, "-G", "Ninja", "-S", prefix / "share/doc/afterglow/docs/example", "-B", folder,
            f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_CXX_COMPILER={compiler}", f"-DCMAKE_CXX_FLAGS={flags}")
     output(cmake, "--build", folder)
     printed = output(folder / "irradiance", "builtin:cornell", 0.278, 0.54, 0.28)

@@ -84,6 +84,7 @@ TEST(CommandChart, MeasuresSomeSweepsAlone) {
     EXPECT_GT(first["rel_rmse"], 0.04);
     EXPECT_EQ(first["coarse_radius"], points[0]["coarse_radius"]); // which is enough for 30 %
 
+    EXPECT_EQ(run(start + "target=0.3 --max-time 9").status, 2); // those that are there were not limited
     EXPECT_EQ(run(start + "target=0.3 --max-time 0").status, 2);
     EXPECT_EQ(run(start + "dance").status, 2);
     EXPECT_EQ(run(start + "target=0.31").status, 2);

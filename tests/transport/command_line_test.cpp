@@ -62,6 +62,51 @@ TEST(CommandLine, WrongUsageIsStatusTwo) {
     EXPECT_EQ(folder.count(), 0u);
 }
 
+TEST(CommandLine, RefusesNumbersThatNoSceneCanHave) {
+    const TemporaryFolder folder;
+    const std::string picture = " -o '" + folder.path("a.exr") + "'", table = " -o '" + folder.path("a.csv") + "'";
+    const std::string down = " --light-direction 0,-1,0";
+    for (const std::string& arguments :
+         {"precompute builtin:cornell --draft" + picture + " --viewpoint 1e30,0,0",
+          "precompute builtin:cornell --no-verification" + picture + " --coarse-radius 1e20",
+          "precompute builtin:cornell --no-verification" + picture + " --coarse-radius 1e-60",
+          "precompute builtin:cornell --no-verification" + picture + " --coarse-radius 1e-30",
+          "precompute builtin:cornell --no-verification" + picture + " --epsilon 1e39",
+          "reference builtin:cornell --strategy connected" + picture + camera + down + " --light-position 1e30,0,0",
+          "reference builtin:cornell" + picture + light + " --camera-position 1e30,0,0 --camera-target 0,0,0"}) {
+        SCOPED_TRACE(arguments);
+        expect_failure(run(arguments + " --quiet"), 2);
+    }
+    const std::string far = folder.write("far.csv", "1e30,0,0,0,1,0\n");
+    expect_failure(run("reference builtin:cornell --quiet --points '" + far + "'" + table + light), 1);
+    EXPECT_EQ(folder.count(), 1u);
+}
+
+TEST(CommandLine, LosesNoFileToAnother) {
+    const TemporaryFolder folder;
+    const std::string scene = folder.write("s.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const std::string points = folder.write("p.csv", "0,0,0,0,1,0\n");
+    const std::string content = content_of(scene);
+    const std::string draft = " --draft --quiet -o '", one = folder.path("one"), same = folder.path("./one");
+    for (const std::string& arguments :
+         {"precompute builtin:cornell" + draft + one + "' --report '" + same + "'",
+          "precompute builtin:cornell --quiet -o '" + one + "' --checkpoint '" + same + "'",
+          "precompute '" + scene + "'" + draft + scene + "'",
+          "precompute '" + scene + "'" + draft + one + "' --report '" + folder.path("./s.obj") + "'",
+          "precompute builtin:cornell" + draft + "'",
+          "reference builtin:cornell --quiet --points '" + points + "' -o '" + points + "'" + light,
+          "reference builtin:cornell --quiet -o '" + one + ".exr' --report '" + one + ".exr'" + light + camera,
+          "query '" + scene + "' --points '" + points + "' -o '" + scene + "'" + light,
+          "render '" + scene + "' -o '" + one + ".jpg'" + light + camera,
+          "reference builtin:cornell -o '" + one + ".jpg'" + light + camera,
+          "precompute '" + folder.path("caf\xe9.obj") + "'" + draft + one + "'"}) {
+        SCOPED_TRACE(arguments);
+        expect_failure(run(arguments), 2);
+    }
+    EXPECT_EQ(content_of(scene), content);
+    EXPECT_EQ(folder.count(), 2u);
+}
+
 TEST(CommandLine, FaultsOfFilesAreStatusOneAndLeaveNothingBehind) {
     const TemporaryFolder folder, inputs;
     const std::string bad = inputs.write("bad.csv", "0.1,0.2,0.3,0,1,0\n1,2\n");
