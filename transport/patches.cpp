@@ -50,7 +50,7 @@ std::uint64_t hash_of(const Likeness& key) {
 
 } // namespace
 
-PatchGrid::PatchGrid(const Scene& scene, float size)
+PatchGrid::PatchGrid(const Scene& scene, float size, const Eigen::AlignedBox3f& used)
     : scene_(scene), size_(size), cells_(scene.triangles.size()) {
     constexpr float most_along = 1024.0f;
     std::uint64_t cells = 0;
@@ -64,12 +64,19 @@ PatchGrid::PatchGrid(const Scene& scene, float size)
             small.push_back(t);
             continue;
         }
-        const auto along = [&](const Vec3& edge) {
-            return static_cast<std::uint16_t>(std::clamp(std::ceil(edge.norm() / size), 1.0f, most_along));
-        };
-        cells_[t] = {static_cast<std::uint32_t>(cells), along(ab), along(ac)};
+        const float along_u = std::max(1.0f, std::ceil(ab.norm() / size));
+        const float along_v = std::max(1.0f, std::ceil(ac.norm() / size));
+        if (std::max(along_u, along_v) > most_along) {
+            windows_.push_back(used_window(a, ab, ac, used));
+            windows_.back().first = static_cast<std::uint32_t>(cells);
+            cells_[t] = {static_cast<std::uint32_t>(windows_.size() - 1), 0, 0};
+        } else {
+            cells_[t] = {static_cast<std::uint32_t>(cells), static_cast<std::uint16_t>(along_u),
+                         static_cast<std::uint16_t>(along_v)};
+        }
         large_.push_back(t);
-        cells += static_cast<std::uint64_t>(cells_[t].along_u) * cells_[t].along_v;
+        const Window w = window_of(t);
+        cells += static_cast<std::uint64_t>(w.count_u) * w.count_v;
         if (cells + scene.triangles.size() > 0x7fffffffu / 2)
             throw Error("the scene needs more than 10^9 surface patches of size "
                         + std::to_string(size) + "; choose a larger --coarse-radius");
@@ -77,6 +84,63 @@ PatchGrid::PatchGrid(const Scene& scene, float size)
     first_shared_ = static_cast<std::uint32_t>(cells);
     share_cells(small);
     count_ = 2 * (first_shared_ + static_cast<std::uint32_t>(shared_.size()));
+}
+
+PatchGrid::Window PatchGrid::window_of(std::uint32_t triangle) const {
+    const Cells& c = cells_[triangle];
+    if (c.along_u == 0) return windows_[c.first];
+    return {c.first, c.along_u, c.along_v, 0, 0, c.along_u, c.along_v};
+}
+
+PatchGrid::Window PatchGrid::used_window(const Vec3& a, const Vec3& ab, const Vec3& ac,
+                                         const Eigen::AlignedBox3f& used) const {
+    // The triangle, in its own coordinates, cut by the six sides of the box [Sutherland and Hodgman 1974].
+    using Place = Eigen::Vector2d;
+    std::vector<Place> inside = {{0, 0}, {1, 0}, {0, 1}}, cut;
+    for (int side = 0; side < 6; ++side) {
+        const int axis = side / 2;
+        const auto depth = [&](const Place& p) {
+            const double x = a[axis] + p.x() * ab[axis] + p.y() * ac[axis];
+            return side % 2 == 0 ? x - used.min()[axis] : used.max()[axis] - x;
+        };
+        cut.clear();
+        for (std::size_t k = 0; k < inside.size(); ++k) {
+            const Place &from = inside[k], &to = inside[(k + 1) % inside.size()];
+            const double d0 = depth(from), d1 = depth(to);
+            if (d0 >= 0.0) cut.push_back(from);
+            if ((d0 < 0.0) != (d1 < 0.0)) cut.push_back(from + d0 / (d0 - d1) * (to - from));
+        }
+        inside.swap(cut);
+    }
+    constexpr double most_along = 1 << 30;
+    const auto along = [&](const Vec3& edge) {
+        return static_cast<std::uint32_t>(std::clamp(std::ceil(edge.cast<double>().norm() / size_), 1.0, most_along));
+    };
+    Window w{0, along(ab), along(ac), 0, 0, 1, 1};
+    if (inside.empty()) return w;
+    const auto limit = [&](int axis, std::uint32_t cells, std::uint32_t& begin, std::uint32_t& count) {
+        double least = 1.0, most = 0.0;
+        for (const Place& p : inside) {
+            least = std::min(least, p[axis]);
+            most = std::max(most, p[axis]);
+        }
+        begin = static_cast<std::uint32_t>(std::clamp(std::floor(least * cells), 0.0, cells - 1.0));
+        const auto end = static_cast<std::uint32_t>(std::clamp(std::ceil(most * cells), begin + 1.0, cells * 1.0));
+        count = end - begin;
+    };
+    limit(0, w.along_u, w.begin_u, w.count_u);
+    limit(1, w.along_v, w.begin_v, w.count_v);
+    return w;
+}
+
+std::uint32_t PatchGrid::patch_in(const Window& w, const Hit& hit) {
+    const auto cell = [](float place, std::uint32_t along, std::uint32_t begin, std::uint32_t count) {
+        const auto k = static_cast<std::uint32_t>(static_cast<double>(place) * along);
+        return std::clamp(k, begin, begin + count - 1) - begin;
+    };
+    const std::uint32_t i = cell(hit.u, w.along_u, w.begin_u, w.count_u);
+    const std::uint32_t j = cell(hit.v, w.along_v, w.begin_v, w.count_v);
+    return 2 * (w.first + j * w.count_u + i) + static_cast<std::uint32_t>(hit.back_side);
 }
 
 void PatchGrid::share_cells(const std::vector<std::uint32_t>& small) {
@@ -140,18 +204,22 @@ PatchGrid::Location PatchGrid::locate(std::uint32_t patch) const {
     const std::uint32_t cell = patch / 2;
     if (cell >= first_shared_) return {shared_[cell - first_shared_].middle, 0, 0};
     const auto next = std::upper_bound(large_.begin(), large_.end(), cell, [&](std::uint32_t c, std::uint32_t t) {
-        return c < cells_[t].first;
+        return c < window_of(t).first;
     });
-    const Cells& c = cells_[*(next - 1)];
-    return {*(next - 1), (cell - c.first) % c.along_u, (cell - c.first) / c.along_u};
+    const Window w = window_of(*(next - 1));
+    return {*(next - 1), w.begin_u + (cell - w.first) % w.count_u, w.begin_v + (cell - w.first) / w.count_u};
 }
 
 PatchGrid::Part PatchGrid::part(const Location& at) const {
     // [u0, u1] x [v0, v1] below u + v = 1, where the triangle's third edge runs: the corner
     // triangle that begins at (u0, v0), less those at (u1, v0) and (u0, v1), plus the one taken
     // away twice.
-    const Cells& c = cells_[at.triangle];
+    const Window c = window_of(at.triangle);
     Part part;
+    const double du = 1.0 / c.along_u, dv = 1.0 / c.along_v;
+    const double u0 = at.i * du, v0 = at.j * dv;
+    if (cells_[at.triangle].along_u == 0 && u0 + v0 + du + dv <= 1.0) // too small for the differences below
+        return {2.0 * du * dv, u0 + 0.5 * du, v0 + 0.5 * dv};
     for (int k = 0; k < 4; ++k) {
         const double u = static_cast<double>(at.i + (k & 1)) / c.along_u;
         const double v = static_cast<double>(at.j + (k >> 1)) / c.along_v;
@@ -182,7 +250,7 @@ Hit PatchGrid::center(std::uint32_t patch) const {
 
 std::array<Hit, 4> PatchGrid::corners(std::uint32_t patch) const {
     const Location at = locate(patch);
-    const Cells& c = cells_[at.triangle];
+    const Window c = window_of(at.triangle);
     const Hit centre = center(patch);
     std::array<Hit, 4> corners;
     for (std::uint32_t k = 0; k < 4; ++k) {

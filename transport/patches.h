@@ -17,16 +17,20 @@ namespace afterglow {
 /// hit is a few operations away. Triangles with no edge longer than half the size share a cell with
 /// others like them: those whose centroids lie in one cube three quarters of the size long, whose normals
 /// are within some 20 degrees and whose material is the same; so that cells become no more than the
-/// surface needs, however fine its triangles. Both sides of a cell have ids of their own: 2 * cell +
+/// surface needs, however fine its triangles. Of a triangle with edges of more than 1024 cells (the ground that
+/// a room stands on) only what lies in the box that is used has cells of its own; what is beyond counts to
+/// those at the box's border. Both sides of a cell have ids of their own: 2 * cell +
 /// back side.
 class PatchGrid {
 public:
     /// Keeps a reference. size: largest length of a cell along the triangle's first two edges [world].
-    PatchGrid(const Scene& scene, float size);
+    PatchGrid(const Scene& scene, float size, const Eigen::AlignedBox3f& used);
+    PatchGrid(const Scene& scene, float size) : PatchGrid(scene, size, scene.bounds()) {}
 
     std::uint32_t patch_count() const { return count_; }
     std::uint32_t patch_of(const Hit& hit) const {
         const Cells& c = cells_[hit.primitive];
+        if (c.along_u == 0) return patch_in(windows_[c.first], hit);
         const auto i = std::min<std::uint32_t>(c.along_u - 1u, static_cast<std::uint32_t>(hit.u * c.along_u));
         const auto j = std::min<std::uint32_t>(c.along_v - 1u, static_cast<std::uint32_t>(hit.v * c.along_v));
         return 2 * (c.first + j * c.along_u + i) + static_cast<std::uint32_t>(hit.back_side);
@@ -44,9 +48,16 @@ public:
 
 private:
     struct Cells {
-        std::uint32_t first;
+        std::uint32_t first;            // where along_u is 0, of windows_
         std::uint16_t along_u, along_v;
     };
+    /// Of the cells of a triangle, `along` its edges, those from `begin` on have numbers.
+    struct Window {
+        std::uint32_t first, along_u, along_v, begin_u, begin_v, count_u, count_v;
+    };
+    static std::uint32_t patch_in(const Window& w, const Hit& hit);
+    Window window_of(std::uint32_t triangle) const;
+    Window used_window(const Vec3& a, const Vec3& ab, const Vec3& ac, const Eigen::AlignedBox3f& used) const;
     /// The triangle of a patch, and the patch's column and row in it.
     struct Location {
         std::uint32_t triangle, i, j;
@@ -70,6 +81,7 @@ private:
     const Scene& scene_;
     float size_;
     std::vector<Cells> cells_;          // a triangle each
+    std::vector<Window> windows_;
     std::vector<std::uint32_t> large_;  // the triangles with cells of their own, rising as their cells do
     std::uint32_t first_shared_ = 0;
     std::vector<Shared> shared_;        // the cells from first_shared_ on

@@ -37,9 +37,12 @@ void sender_row(const Surface& surface, const ShepardBasis& basis, int level, co
 SenderRows::SenderRows(const Surface& surface, const ShepardBasis& basis, int levels,
                        float patch_share)
     : surface_(surface), basis_(basis) {
+    const PointHierarchy& points = basis.points();
+    const Vec3 reach = Vec3::Constant(points.support.maxCoeff());
+    const Eigen::AlignedBox3f used(points.position.rowwise().minCoeff() - reach, points.position.rowwise().maxCoeff() + reach);
     std::uint64_t count = 0;
     for (int l = 0; l < levels; ++l) {
-        grid_.emplace_back(surface.scene(), patch_share * basis.points().spacing[l]);
+        grid_.emplace_back(surface.scene(), patch_share * points.spacing[l], used);
         first_.push_back(static_cast<std::uint32_t>(count));
         count += grid_.back().patch_count();
     }

@@ -85,6 +85,35 @@ TEST(PatchGrid, HasItsCentresCloseToTheHitsOnSlivers) {
     expect_centres_close_to_their_hits(single_triangle(c, a, b), 0.2f, "cab");
 }
 
+TEST(PatchGrid, CutsTheGroundFinelyWhereItIsUsedHoweverFarItReaches) {
+    for (const float reach : {100.0f, 1e3f, 1e5f}) {
+        const Scene scene = single_triangle({-reach, -reach, 0}, {2 * reach, -reach, 0}, {-reach, 2 * reach, 0});
+        const Eigen::AlignedBox3f used(Vec3(-2, 1, -1), Vec3(3, 4, 1));
+        const PatchGrid grid(scene, 0.1f, used);
+        EXPECT_LT(grid.patch_count(), 2u * 60 * 40) << reach;
+        Rng rng(3, 0);
+        for (int k = 0; k < 2000; ++k) {
+            const Vec3 x(-2 + 5 * rng.uniform(), 1 + 3 * rng.uniform(), 0);
+            Hit hit;
+            hit.distance = 1.0f;
+            hit.primitive = 0;
+            hit.u = (x.x() + reach) / (3 * reach);
+            hit.v = (x.y() + reach) / (3 * reach);
+            hit.back_side = k % 2 == 1;
+            const std::uint32_t patch = grid.patch_of(hit);
+            ASSERT_LT(patch, grid.patch_count());
+            ASSERT_EQ(patch, grid.patch_of(grid.center(patch)));
+            ASSERT_LT((place(scene, hit) - place(scene, grid.center(patch))).norm(), 0.12f) << reach;
+        }
+        Hit outside;
+        outside.primitive = 0;
+        for (const float u : {0.0f, 0.999f}) { // counts to the border
+            outside.u = u;
+            ASSERT_LT(grid.patch_of(outside), grid.patch_count());
+        }
+    }
+}
+
 /// The unit square as n x n x 2 triangles, bent up along x = 1/2, two materials in y.
 Scene bent_sheet(int n) {
     Scene scene;
