@@ -47,7 +47,7 @@ public:
         }
         // Enough for any sensible face; a monstrous one must not take quadratic time and more.
         tests_left_ = 8 * point_.size() * std::min<std::size_t>(point_.size(), 256);
-        refusals_left_ = point_.size() * std::min<std::size_t>(point_.size(), 2048);
+        refusals_left_ = point_.size() * std::min<std::size_t>(point_.size(), 512);
     }
 
     void clip(std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -92,7 +92,7 @@ private:
 
     std::vector<Point> point_;
     std::vector<std::uint32_t> next_, previous_;
-    std::size_t tests_left_, refusals_left_; // of corners on an edge, which take no tests
+    std::size_t tests_left_, refusals_left_; // a corner on an edge is refused without a test
 };
 
 /// True where the diagonal from corner 0 to corner 2 lies inside a quadrilateral.
