@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 namespace afterglow {
 namespace {
@@ -36,16 +37,21 @@ Outlook look_around(const Surface& surface, const Vec3& from) {
     return {static_cast<double>(hits) / rays, static_cast<double>(fronts) / hits, distance / hits};
 }
 
-/// Points in the open on the segments of diffuse paths from `from`.
-std::vector<Vec3> reachable_places(const Surface& surface, const Vec3& from, std::uint64_t seed) {
+constexpr int looking_paths = 128; // of reachable_places()
+
+/// Points in the open on the segments of diffuse paths from `from`; `long_paths`: how many of the paths leave
+/// a candidate.
+std::vector<Vec3> reachable_places(const Surface& surface, const Vec3& from, std::uint64_t seed,
+                                   int* long_paths = nullptr) {
     std::vector<Vec3> places;
-    for (int path = 0; path < 128; ++path) {
+    for (int path = 0; path < looking_paths; ++path) {
         Rng rng(seed, path);
         Vec3 origin = from;
         Vec3 direction = sample_sphere({rng.uniform(), rng.uniform()});
         for (int bounce = 0; bounce < 16; ++bounce) {
             const Hit hit = surface.closest_hit({origin, direction});
             if (!hit) break;
+            if (long_paths && bounce == skipped_bounces) ++*long_paths;
             places.push_back(origin + rng.uniform() * hit.distance * direction);
             const SurfacePoint x = surface.point(hit);
             origin = surface.lifted(x);
@@ -55,47 +61,100 @@ std::vector<Vec3> reachable_places(const Surface& surface, const Vec3& from, std
     return places;
 }
 
+struct Lookout {
+    Vec3 place;
+    Outlook outlook;
+};
+
+/// By falling score.
+std::vector<Lookout> looked_from(const Surface& surface, const std::vector<Vec3>& places) {
+    std::vector<Lookout> lookouts(places.size());
+    parallel_for(static_cast<Index>(places.size()),
+                 [&](Index i) { lookouts[i] = {places[i], look_around(surface, places[i])}; });
+    // A scene may be wound the other way as a whole: then most of what one sees from open places, not
+    // from inside solids, are back sides.
+    double fronts = 0.0, backs = 0.0;
+    for (const Lookout& l : lookouts) {
+        fronts += l.outlook.front_share * l.outlook.openness();
+        backs += (1.0 - l.outlook.front_share) * l.outlook.openness();
+    }
+    if (backs > 2.0 * fronts)
+        for (Lookout& l : lookouts) l.outlook.front_share = 1.0 - l.outlook.front_share;
+    std::stable_sort(lookouts.begin(), lookouts.end(),
+                     [](const Lookout& a, const Lookout& b) { return a.outlook.score() > b.outlook.score(); });
+    return lookouts;
+}
+
+/// Anywhere in the scene's bounding box.
+std::vector<Vec3> places_in_box(const Surface& surface, int count, std::uint64_t seed) {
+    const Eigen::AlignedBox3f box = surface.scene().bounds();
+    std::vector<Vec3> places;
+    for (int i = 0; i < count; ++i) {
+        Rng rng(seed, static_cast<std::uint64_t>(i));
+        const Vec3 u(rng.uniform(), rng.uniform(), rng.uniform());
+        places.push_back(box.min() + box.sizes().cwiseProduct(u));
+    }
+    return places;
+}
+
+/// In the open between two surfaces, of which one is a triangle that is any with equal chance: where the
+/// triangles are, however far the ground reaches around them.
+std::vector<Vec3> places_off_triangles(const Surface& surface, int count, std::uint64_t seed) {
+    std::vector<Vec3> places;
+    const auto triangles = static_cast<double>(surface.scene().triangles.size());
+    for (int i = 0; i < count && triangles > 0.0; ++i) {
+        Rng rng(seed, static_cast<std::uint64_t>(i));
+        Hit from;
+        from.primitive = static_cast<std::uint32_t>(rng.uniform() * triangles);
+        from.back_side = rng.uniform() < 0.5f;
+        from.u = 1.0f - std::sqrt(rng.uniform());
+        from.v = (1.0f - from.u) * rng.uniform();
+        const SurfacePoint x = surface.point(from);
+        const Vec3 origin = surface.lifted(x);
+        const Vec3 direction = Frame(x.normal).to_world(sample_cosine({rng.uniform(), rng.uniform()}));
+        if (const Hit hit = surface.closest_hit({origin, direction}))
+            places.push_back(origin + rng.uniform() * hit.distance * direction);
+    }
+    return places;
+}
+
+/// The first from which enough particles live to leave candidates; none where there is none.
+const Lookout* first_that_holds_light(const Surface& surface, std::span<const Lookout> lookouts, std::uint64_t seed) {
+    for (const Lookout& l : lookouts) {
+        if (l.outlook.score() <= 0.0) break;
+        int long_paths = 0;
+        reachable_places(surface, l.place, seed, &long_paths);
+        if (long_paths >= looking_paths / 16) return &l;
+    }
+    return nullptr;
+}
+
 } // namespace
 
 std::vector<Vec3> find_viewpoints(const Surface& surface, std::uint64_t seed) {
     constexpr int tried = 512;
-    const Eigen::AlignedBox3f box = surface.scene().bounds();
-    std::vector<Vec3> place(tried);
-    std::vector<Outlook> outlook(tried);
-    parallel_for(tried, [&](Index i) {
-        Rng rng(seed, static_cast<std::uint64_t>(i));
-        const Vec3 u(rng.uniform(), rng.uniform(), rng.uniform());
-        place[i] = box.min() + box.sizes().cwiseProduct(u);
-        outlook[i] = look_around(surface, place[i]);
-    });
-    // A scene may be wound the other way as a whole: then most of what one sees from open places, not
-    // from inside solids, are back sides.
-    double fronts = 0.0, backs = 0.0;
-    for (const Outlook& o : outlook) {
-        fronts += o.front_share * o.openness();
-        backs += (1.0 - o.front_share) * o.openness();
+    std::vector<Lookout> lookouts = looked_from(surface, places_in_box(surface, tried, seed));
+    const Lookout* first = first_that_holds_light(surface, lookouts, hash64(seed, 1));
+    if (!first) {
+        std::vector<Lookout> others = looked_from(surface, places_off_triangles(surface, tried, hash64(seed, 2)));
+        if (const Lookout* found = first_that_holds_light(surface, others, hash64(seed, 1))) {
+            lookouts.swap(others); // pointers stay
+            first = found;
+        }
     }
-    if (backs > 2.0 * fronts)
-        for (Outlook& o : outlook) o.front_share = 1.0 - o.front_share;
+    if (!first && lookouts.front().outlook.score() <= 0.0) return {surface.scene().bounds().center()};
+    if (!first) first = &lookouts.front();
 
-    std::vector<int> order(tried);
-    for (int i = 0; i < tried; ++i) order[i] = i;
-    std::stable_sort(order.begin(), order.end(),
-                     [&](int a, int b) { return outlook[a].score() > outlook[b].score(); });
-    if (outlook[order[0]].score() <= 0.0) return {box.center()};
-
-    const double best = outlook[order[0]].score();
-    std::vector<Vec3> viewpoints{place[order[0]]};
+    std::vector<Vec3> viewpoints{first->place};
     std::vector<Vec3> known = reachable_places(surface, viewpoints[0], hash64(seed, 1));
-    for (int i : order) {
-        const Outlook& o = outlook[i];
-        if (o.score() < 0.1 * best || o.hit_share < 0.9 || o.front_share < 0.9) continue;
-        const bool seen = std::any_of(known.begin(), known.end(), [&](const Vec3& p) {
-            return !surface.blocked(place[i], p);
-        });
+    for (const Lookout& l : lookouts) {
+        const Outlook& o = l.outlook;
+        if (o.score() < 0.1 * first->outlook.score() || o.hit_share < 0.9 || o.front_share < 0.9) continue;
+        const bool seen = std::any_of(known.begin(), known.end(),
+                                      [&](const Vec3& p) { return !surface.blocked(l.place, p); });
         if (seen) continue;
-        viewpoints.push_back(place[i]);
-        const auto more = reachable_places(surface, place[i], hash64(seed, viewpoints.size()));
+        viewpoints.push_back(l.place);
+        const auto more = reachable_places(surface, l.place, hash64(seed, viewpoints.size()));
         known.insert(known.end(), more.begin(), more.end());
     }
     return viewpoints;

@@ -14,9 +14,9 @@ struct Candidate {
     Hit hit; // primitive, side and barycentric weights alone
 };
 
-/// Places in the open from which the scene can be looked at: the middle of its largest interior, and
-/// one for each further interior that no light from the others reaches. At least one; the centre of
-/// the bounding box where nothing better is found.
+/// Places in the open from which the scene can be looked at: the middle of its largest interior, where light is
+/// reflected more than a few times, and one for each further interior that no light from the others reaches. At
+/// least one; the centre of the bounding box where nothing better is found.
 std::vector<Vec3> find_viewpoints(const Surface& surface, std::uint64_t seed);
 
 /// Importance particles: paths from the viewpoints that reflect diffusely, thirty times at most, and

@@ -2,6 +2,7 @@
 
 #include "basis/morton.h"
 #include "basis/nearest_points.h"
+#include "core/error.h"
 #include "core/parallel.h"
 
 #include <algorithm>
@@ -55,6 +56,8 @@ std::vector<float> adaptive_supports(const std::vector<Candidate>& points,
 PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& options,
                                HierarchyStatistics* statistics) {
     const auto start = std::chrono::steady_clock::now();
+    if (options.finest_density > 0.0f && options.display && !(options.display->openness_density > 0.0f))
+        throw UsageError("the display level must be placed by openness where the level before it is");
     PointHierarchy hierarchy;
     hierarchy.shape = options.shape;
     hierarchy.level_begin = {0};

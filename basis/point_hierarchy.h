@@ -73,7 +73,8 @@ struct HierarchyStatistics {
     double seconds = 0.0;
 };
 
-/// Builds the hierarchy from the source's candidates [LZT08, sec. 2.3].
+/// Builds the hierarchy from the source's candidates [LZT08, sec. 2.3]. Throws UsageError where the display
+/// level is plain and the finest before it is not.
 PointHierarchy build_hierarchy(CandidateSource& source, const HierarchyOptions& options,
                                HierarchyStatistics* statistics = nullptr);
 

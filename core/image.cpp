@@ -20,8 +20,10 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <half.h>
+#include <limits>
 #include <new>
 #include <span>
 
@@ -138,9 +140,13 @@ std::string encode_png(const Image& image, std::optional<float> key) {
 
 } // namespace
 
-void check_picture_name(const std::string& path) {
-    if (!path.ends_with(".exr") && !path.ends_with(".png"))
-        throw UsageError(path + ": a picture's name must end in .exr or .png");
+void check_picture(const std::string& path, int width, int height) {
+    if (path.ends_with(".exr")) return;
+    if (!path.ends_with(".png")) throw UsageError(path + ": a picture's name must end in .exr or .png");
+    // stb_image_write counts the bytes, three a pixel and one a line, in an int.
+    if ((3 * static_cast<std::int64_t>(width) + 1) * height > std::numeric_limits<int>::max())
+        throw UsageError(path + ": a PNG picture of " + std::to_string(width) + "x" + std::to_string(height)
+                         + " is too large; write .exr, or fewer than 700 million pixels");
 }
 
 void write_image(const std::string& path, const Image& image, PixelType type,
@@ -148,7 +154,7 @@ void write_image(const std::string& path, const Image& image, PixelType type,
     assert(image.width > 0 && image.height > 0 && image.rgb.size() == 3 * pixel_count(image));
     std::string encoded;
     try {
-        check_picture_name(path);
+        check_picture(path, image.width, image.height);
         encoded = path.ends_with(".exr") ? encode_exr(image, type) : encode_png(image, exposure);
     } catch (const Error&) {
         throw;

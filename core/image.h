@@ -29,12 +29,12 @@ enum class PixelType { half_float, full_float };
 /// Writes by the extension: .exr (linear, channels R, G, B, string attributes) or .png (tone mapped:
 /// Reinhard et al. 2002, global operator at the given exposure key, then sRGB; without a key, values
 /// from 0 to 1 are shown as they are). The file appears whole or not at all. Throws FileError;
-/// UsageError for another extension.
+/// UsageError for another extension, or a PNG file of 2^31 bytes or more before it is compressed.
 void write_image(const std::string& path, const Image& image, PixelType type,
                  std::optional<float> exposure = 0.18f);
 
-/// Throws UsageError where write_image() would, for its extension.
-void check_picture_name(const std::string& path);
+/// Throws UsageError where write_image() would.
+void check_picture(const std::string& path, int width, int height);
 
 /// Writes a PNG file of bytes as they are, R, G, B each, rows from the top. Throws FileError.
 void write_png_bytes(const std::string& path, int width, int height, std::span<const unsigned char> rgb);

@@ -93,6 +93,13 @@ Eigen::AlignedBox3f Scene::bounds() const {
     return box;
 }
 
+Vec3 Scene::triangle_normal(std::uint32_t triangle) const {
+    const Triangle& t = triangles[triangle];
+    const auto corner = [&](int k) -> Eigen::Vector3d { return positions[t[k]].cast<double>(); };
+    // In double: rounded to floats, the two products of a needle's cross product cancel to nothing.
+    return (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized().cast<float>();
+}
+
 std::string Scene::content_hash() const {
     // Hash of the parts' hashes: names, summary, viewpoint and normal maps are not part of what light
     // sees.

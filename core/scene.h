@@ -62,6 +62,8 @@ struct Scene {
     SceneSummary summary;
 
     Eigen::AlignedBox3f bounds() const;
+    /// Of unit length, to the front of a triangle; zero where it has no area.
+    Vec3 triangle_normal(std::uint32_t triangle) const;
     /// 128-bit hash of everything that light transport sees, as 32 hexadecimal digits. Normal maps are
     /// not part of it: only pictures see them, and a transfer file fits the scene with others as well.
     std::string content_hash() const;

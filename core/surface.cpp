@@ -33,6 +33,20 @@ RTCRay to_embree(const Ray& ray) {
     return r;
 }
 
+/// How a ray meets a triangle of this normal, of any length.
+struct Facing {
+    bool back_side;
+    float cosine; // see Hit
+
+    Facing(float x, float y, float z, const Vec3& direction) {
+        // In double: the squares of large and small triangles' normals are beyond floats.
+        const Eigen::Vector3d normal(x, y, z);
+        const double along = normal.dot(direction.cast<double>()), length = normal.norm();
+        back_side = along > 0.0;
+        cosine = length > 0.0 ? static_cast<float>(std::abs(along) / length) : 1.0f;
+    }
+};
+
 constexpr std::size_t packet_width = 8;
 /// Of the lift: how far the sides of triangles are moved out. Enough for the rounding of a ray that
 /// starts in the scene, and not as far as rays start off a surface.
@@ -125,11 +139,8 @@ Hit Surface::closest_hit(const Ray& ray) const {
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     embree_intersect(tree_->scene, query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-    const float facing = query.hit.Ng_x * ray.direction.x() + query.hit.Ng_y * ray.direction.y()
-                         + query.hit.Ng_z * ray.direction.z();
-    const float length = std::hypot(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z);
-    return {query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v, facing > 0.0f,
-            length > 0.0f ? std::abs(facing) / length : 1.0f};
+    const Facing facing(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z, ray.direction);
+    return {query.ray.tfar, query.hit.primID, query.hit.u, query.hit.v, facing.back_side, facing.cosine};
 }
 
 void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits, bool coherent) const {
@@ -149,14 +160,10 @@ void Surface::closest_hits(std::span<const Ray> rays, std::span<Hit> hits, bool 
                 hit = {};
                 continue;
             }
-            const float facing = packet.hit.Ng_x[k] * packet.ray.dir_x[k]
-                                 + packet.hit.Ng_y[k] * packet.ray.dir_y[k]
-                                 + packet.hit.Ng_z[k] * packet.ray.dir_z[k];
-            const float length2 = packet.hit.Ng_x[k] * packet.hit.Ng_x[k]
-                                  + packet.hit.Ng_y[k] * packet.hit.Ng_y[k]
-                                  + packet.hit.Ng_z[k] * packet.hit.Ng_z[k];
+            const Facing facing(packet.hit.Ng_x[k], packet.hit.Ng_y[k], packet.hit.Ng_z[k],
+                                rays[begin + k].direction);
             hit = {packet.ray.tfar[k], packet.hit.primID[k], packet.hit.u[k], packet.hit.v[k],
-                   facing > 0.0f,      length2 > 0.0f ? std::abs(facing) / std::sqrt(length2) : 1.0f};
+                   facing.back_side,   facing.cosine};
         }
     }
 }
@@ -193,9 +200,7 @@ void Surface::blocked(std::span<const Vec3> from, std::span<const Vec3> to,
 }
 
 Vec3 Surface::geometric_normal(const Hit& hit) const {
-    const Triangle& t = scene_.triangles[hit.primitive];
-    const Vec3& a = scene_.positions[t[0]];
-    const Vec3 n = (scene_.positions[t[1]] - a).cross(scene_.positions[t[2]] - a).stableNormalized();
+    const Vec3 n = scene_.triangle_normal(hit.primitive);
     return hit.back_side ? Vec3(-n) : n;
 }
 

@@ -91,7 +91,7 @@ void run(ReferenceCommand& command, bool has_camera) {
         if (!has_camera)
             throw UsageError("reference needs --camera-position and --camera-target, or --points");
         command.camera.check();
-        check_picture_name(command.output);
+        check_picture(command.output, command.camera.width, command.camera.height);
     }
     check_outputs({command.output, command.report}, {command.scene, command.points});
     check_scene_name(command.scene);

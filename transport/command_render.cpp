@@ -54,7 +54,7 @@ void run(RenderCommand& command) {
     command.light.check();
     command.camera.check();
     check_outputs({command.output}, {command.file, command.scene});
-    check_picture_name(command.output);
+    check_picture(command.output, command.camera.width, command.camera.height);
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
     if (!command.run.quiet) tell_of_outside_files(opened.scene);

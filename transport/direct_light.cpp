@@ -65,6 +65,13 @@ float counted_share(float splatted_scale) {
                       least_share, 1.0f);
 }
 
+/// The cosine with which light falls on the shading normal ÷ that on the triangle: irradiance is taken by
+/// the first, a ray's flux by the second.
+float shading_share(const Hit& hit, const SurfacePoint& y, const Vec3& direction) {
+    constexpr float least_cosine = 1e-3f; // below, hardly any light falls on the triangle
+    return std::max(0.0f, -direction.dot(y.normal)) / std::max(least_cosine, hit.cosine);
+}
+
 } // namespace
 
 float sampled_share(const Spotlight& light, float distance, float spacing) {
@@ -227,10 +234,33 @@ void DirectLight::sample(const Spotlight& light, std::span<float> result) const 
         256);
 }
 
+void DirectLight::keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row) const {
+    const std::uint32_t begin = points_.begin(level_);
+    std::erase_if(row, [&](const BasisEntry& entry) { return areas_[entry.index - begin] == 0.0f; });
+    if (!row.empty()) {
+        make_sum_one(row);
+        return;
+    }
+    constexpr int most = 32;
+    constexpr float reach = 4.0f; // spacings
+    thread_local std::vector<std::uint32_t> near;
+    near.clear();
+    nearest().closest(y.position, most, near);
+    for (const std::uint32_t k : near) {
+        const SurfacePoint other = points_.point(begin + k);
+        if ((other.position - y.position).norm() > reach * points_.spacing[level_]) return;
+        if (areas_[k] == 0.0f || other.normal.dot(y.normal) <= 0.5f
+            || surface_.blocked(surface_.lifted(y), surface_.lifted(other)))
+            continue;
+        row.push_back({begin + k, 1.0f});
+        return;
+    }
+}
+
 void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
     const float scale = relative_scale(light) / points_.spacing[level_];
     const float farthest = only_sampled / scale;
-    const float height = 1.0f - std::cos(radians(light.outer_angle)); // of the cone's spherical cap
+    const float height = 1.0f - cos_degrees(light.outer_angle); // of the cone's spherical cap
     const float solid_angle = 2.0f * static_cast<float>(EIGEN_PI) * height;
     const Frame frame(light.direction);
     const Falloff falloff_of(light);
@@ -263,8 +293,10 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
             if (splatted == 0.0f) continue;
             Splat& splat = splats[static_cast<std::size_t>(first / packet)].emplace_back();
             sender_row(surface_, basis(), level_, hit, splat.row);
-            splat.power = (splatted * solid_angle / splatted_rays) * light.intensity
-                          * surface_.reflectance(hit);
+            const SurfacePoint y = surface_.point(hit);
+            keep_seen(y, splat.row);
+            const float flux = splatted * solid_angle / splatted_rays * shading_share(hit, y, rays[k - first].direction);
+            splat.power = flux * light.intensity * surface_.reflectance(hit);
         }
     });
     const std::uint32_t begin = points_.begin(level_);
@@ -272,8 +304,7 @@ void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
         for (const Splat& splat : some)
             for (const BasisEntry& entry : splat.row) {
                 const std::size_t j = entry.index - begin;
-                if (areas_[j] > 0.0f)
-                    Rgb::Map(&result[3 * j]) += (entry.value / areas_[j]) * splat.power;
+                Rgb::Map(&result[3 * j]) += (entry.value / areas_[j]) * splat.power;
             }
 }
 

@@ -26,14 +26,16 @@ namespace afterglow {
 /// Where it is many spacings, the first share is *sampled* at the points: rho_j p E(x_j), a shadow ray
 /// each. Where the light that is seen, falloff V, differs from a neighbour's by more than a quarter,
 /// an edge of a shadow or of the cone is close, and E is the mean over 8 places within a quarter of
-/// the spacing: so that an edge that moves switches no sender at once. Where s is few spacings, points could miss what is lit, or its brightest part; the second share is
-/// *splatted*: rays leave the light, number k carries the flux Phi_k, and
+/// the spacing: so that an edge that moves switches no sender at once. Where s is few spacings, points could
+/// miss what is lit, or its brightest part; the second share is *splatted*: rays leave the light, number k
+/// carries the flux Phi_k, times the cosine on the shading normal ÷ that on the triangle, and
 ///
 ///     b_j += sum_k rho(y_k) (1 - p) Phi_k B_j(y_k) / <B_j, 1>,
 ///
-/// which loses no light however small the lit place is. Rays end where p = 1, so that they cost
-/// nothing where the light is far from everything. Of the 8192, so many of their sequence's first ones count
-/// where they end, each with as much more flux, that 64 (1 - p)^2 fall on a sender.
+/// which loses no light however small the lit place is. Functions that are seen nowhere have no part in it;
+/// where all that reach y_k are such, the closest one that is seen has it all. Rays end where p = 1, so that
+/// they cost nothing where the light is far from everything. Of the 8192, so many of their sequence's first
+/// ones count where they end, each with as much more flux, that 64 (1 - p)^2 fall on a sender.
 class DirectLight {
 public:
     /// The senders of one level; `areas`: <B_j, 1> of each [world^2], 0 where none was seen. Keeps
@@ -78,6 +80,8 @@ private:
     Rgb mean_irradiance(const Spotlight& light, const Falloff& falloff, Index k) const;
     void sample(const Spotlight& light, std::span<float> result) const;
     void splat(const Spotlight& light, std::span<float> result) const;
+    /// Leaves in a row at y the functions that have an area.
+    void keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row) const;
 };
 
 /// p(d), see DirectLight.

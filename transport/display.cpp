@@ -59,6 +59,8 @@ Rgb Display::gather(const SurfacePoint& x, const Vec3& shown, const VectorIrradi
         SurfacePoint y = x;
         Vec3 direction = frame.to_world(sample_cosine(scrambled_sobol2(static_cast<std::uint32_t>(k), seed)));
         for (int vertex = 0; vertex < most_vertices; ++vertex) {
+            // Above the horizon of a normal map's normal, a direction may lie below the surface.
+            if (direction.dot(y.normal) <= 0.0f) break;
             const Hit hit = surface_.closest_hit({surface_.lifted(y), direction});
             if (!hit) break;
             y = surface_.point(hit);

@@ -144,10 +144,12 @@ MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
     }
 
     constexpr int pilot_batches = 8;
-    constexpr Index pilot_samples = 16; // a batch
+    constexpr double most_of_budget = 0.25;
+    const Index pilot_samples = // a batch
+        std::clamp<Index>(static_cast<Index>(most_of_budget * static_cast<double>(options.max_samples)) / pilot_batches, 1, 16);
     BatchSums pilot(items, outputs, pilot_batches, hash64(options.seed, 2));
     pilot.extend(
-        sampler, [](Index) { return pilot_samples; }, nullptr);
+        sampler, [&](Index) { return pilot_samples; }, nullptr);
     const MeanEstimate first = pilot.estimate();
     const std::vector<double> share = shares(first, items, outputs);
 
@@ -158,7 +160,7 @@ MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
     // The first round is meant to fall short: the pilot's error is a rough guess.
     double samples = 0.3 * pilot_batches * pilot_samples
                      * std::pow(worst(result.relative_error) / options.target_error, 2.0);
-    samples = std::clamp(samples, 4.0 * batches, static_cast<double>(options.max_samples));
+    samples = std::min(std::max(samples, 4.0 * batches), static_cast<double>(options.max_samples));
     double reached = 0.0; // share of the work, as far as it can be told
     for (;;) {
         const double expected = std::max(

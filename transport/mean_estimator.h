@@ -36,7 +36,7 @@ struct MeanEstimate {
 /// Each of the batches of an item follows a randomised sequence of its own, so that their spread
 /// measures the error of quasi-random samples too, to which a sample variance is blind.
 ///
-/// For a target error, a pilot whose samples are then thrown away (with them, items whose first
+/// For a target error, a pilot of at most a quarter of `max_samples`, whose samples are then thrown away (with them, items whose first
 /// samples happened to be small would get few more of them and the means were biased) gives the
 /// standard deviation s_i of each item; N samples in all are shared out as n_i ~ s_i, which has the
 /// least sum of s_i^2 / n_i (Neyman 1934). N grows until the measured error is small enough; that

@@ -28,8 +28,8 @@ using LinkVector = Eigen::Vector4f;
 ///     12-23  x, y, z: four bits each, two's complement, -7 to 7
 ///
 /// and the link is (x, y, z) 2^(E - 31). Where x, y and z are all zero the entry is a *jump*: bits
-/// 0-11 are a step, and there is no link. Links are sums over few rays: rounding to a fourteenth of
-/// the largest component is lost in their noise.
+/// 0-11 are a step, and there is no link. Links are sums over few rays: rounding by at most a
+/// fifteenth to two fifteenths of the largest component is lost in their noise.
 using PackedLink = std::array<std::uint8_t, 3>;
 
 /// Writes the rows of links.

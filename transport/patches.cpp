@@ -20,7 +20,7 @@ struct Lie {
 Lie lie_of(const Scene& scene, std::uint32_t triangle) {
     const Triangle& t = scene.triangles[triangle];
     const Vec3 &a = scene.positions[t[0]], &b = scene.positions[t[1]], &c = scene.positions[t[2]];
-    return {(a + b + c) / 3.0f, (b - a).cross(c - a).stableNormalized()};
+    return {(a + b + c) / 3.0f, scene.triangle_normal(triangle)};
 }
 
 /// Small triangles of one key are alike enough to share a cell.

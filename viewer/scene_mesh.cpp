@@ -41,12 +41,6 @@ Vertex vertex(const Scene& scene, std::uint32_t t, int corner) {
     return v;
 }
 
-Vec3 normal_of(const Scene& scene, std::uint32_t t) {
-    const Triangle& corners = scene.triangles[t];
-    const Vec3& a = scene.positions[corners[0]];
-    return (scene.positions[corners[1]] - a).cross(scene.positions[corners[2]] - a).stableNormalized();
-}
-
 } // namespace
 
 SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
@@ -78,7 +72,7 @@ SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
             vertices.push_back(vertex(scene, t, corner));
             pieces_.back().box.extend(scene.positions[scene.triangles[t][corner]]);
         }
-        normals[k].head<3>() = normal_of(scene, t);
+        normals[k].head<3>() = scene.triangle_normal(t);
     }
     triangles_.set(normals.data(), normals.size());
     gl.BindVertexArray(vertex_array_);

@@ -1,6 +1,7 @@
 #include "basis/morton.h"
 #include "basis/point_hierarchy.h"
 #include "core/builtin_scenes.h"
+#include "core/error.h"
 #include "core/parallel.h"
 #include "tests/support/surface_samples.h"
 
@@ -47,6 +48,12 @@ TEST(PointHierarchy, HalvesItsSpacingFromLevelToLevel) {
             EXPECT_LT(more, 4.5);
         }
     }
+}
+
+TEST(PointHierarchy, RefusesAPlainDisplayLevelBehindOneOfOpenness) {
+    HierarchyOptions options{.coarse_radius = 1.0f, .levels = 2, .finest_density = 0.15f,
+                             .display = DisplayLevel{.spacing = 0.5f, .parent = 0, .openness_density = 0.0f}};
+    EXPECT_THROW(make_hierarchy("builtin:two_rooms", options), UsageError);
 }
 
 TEST(PointHierarchy, OrdersEachLevelAlongAMortonCurve) {

@@ -71,7 +71,9 @@ Curve measure_curve(const Experiment& experiment, const std::string& setting,
 
 Curve measure_bounces(const Experiment& experiment, const std::vector<double>& bounces) {
     Curve curve{"bounces", bounces, {}, {}, {}};
-    const TransferOperator transfer = precompute(experiment.surface, base_options(experiment));
+    PrecomputeOptions options = base_options(experiment);
+    options.links.rays = 2048; // what the last bounces add would else be less than the noise is off
+    const TransferOperator transfer = precompute(experiment.surface, options);
     for (const double k : bounces)
         curve.indirect.push_back(indirect_irradiance(experiment, transfer, static_cast<int>(k)));
     curve.finish(experiment);

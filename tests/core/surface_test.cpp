@@ -170,6 +170,49 @@ TEST(Surface, TurnsItsNormalsToTheViewer) {
     EXPECT_GT(backs, 500);
 }
 
+TEST(Surface, HasTheNormalsOfNeedlesAndOfLargeAndSmallTriangles) {
+    // The oracle is in long double, whose mantissa holds the products of floats whole.
+    using Vec3l = Eigen::Matrix<long double, 3, 1>;
+    Rng rng(8, 0);
+    for (const float size : {1e-9f, 1.0f, 1e9f})
+        for (const float width : {1.0f, 1e-3f, 1e-6f}) // of the triangle ÷ its length
+            for (int k = 0; k < 100; ++k) {
+                const Vec3 along = random_direction(rng), middle = size * random_point(rng);
+                const Vec3 tip = middle + 0.5f * size * along + size * width * random_direction(rng);
+                Scene scene;
+                scene.positions = {middle - size * along, middle + size * along, tip};
+                scene.triangles = {{0, 1, 2}};
+                scene.material_index = {0};
+                scene.materials.push_back({"a", Rgb::Constant(0.5f), no_index});
+                const auto corner = [&](std::size_t i) -> Vec3l { return scene.positions[i].cast<long double>(); };
+                const Vec3l cross = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+                if (cross.norm() == 0.0L) continue; // of three rounded corners on a line
+                const Surface surface(scene);
+                Hit hit;
+                hit.primitive = 0;
+                const Vec3 found = surface.geometric_normal(hit);
+                EXPECT_LT((found.cast<long double>() - cross.normalized()).norm(), 1e-6L) << size << " " << width;
+            }
+}
+
+TEST(Surface, TellsTheAngleToLargeAndSmallTriangles) {
+    for (const float size : {1e-8f, 1.0f, 1e11f}) {
+        Scene scene;
+        scene.positions = {{-size, 0, -size}, {0, 0, size}, {size, 0, -size}};
+        scene.triangles = {{0, 1, 2}};
+        scene.material_index = {0};
+        scene.materials.push_back({"a", Rgb::Constant(0.5f), no_index});
+        const Surface surface(scene);
+        const Ray ray{size * Vec3(0.3f, 0.4f, 0.0f), Vec3(-0.6f, -0.8f, 0.0f)};
+        Hit of_packet;
+        surface.closest_hits({&ray, 1}, {&of_packet, 1});
+        for (const Hit& hit : {surface.closest_hit(ray), of_packet}) {
+            ASSERT_TRUE(hit) << size;
+            EXPECT_NEAR(hit.cosine, 0.8f, 1e-5f) << size;
+        }
+    }
+}
+
 TEST(Surface, InterpolatesVertexNormals) {
     Scene scene;
     scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

@@ -77,13 +77,14 @@ with tempfile.TemporaryDirectory() as temporary:
     (folder / "s.obj").write_text("\n".join(lines) + "\n")
     (folder / "points.csv").write_text("1.2,0,1.2,0,1,0\n")
     light = ("--light-position", "10,8,7", "--light-direction", "0.1,-1,0", "--light-cone", "30,40")
-    for maker, reader in ((portable, fast), (fast, portable)):
-        made = run(maker, "precompute", folder / "s.obj", "-o", folder / "s", "--viewpoint", "10,4,7",
-                   "--coarse-radius", 4, "--receiver-levels", 3, "--sender-levels", 2, "--rays", 16,
-                   "--no-verification", "--quiet", environment=PLAIN)
-        expect(made.returncode == 0, f"precompute: {made.stderr}")
-        read = run(reader, "query", folder / "s", "--points", folder / "points.csv", "-o", folder / "e.csv", "--quiet",
-                   *light, environment=PLAIN)
-        expect(read.returncode == 0, f"a file of {maker} is refused by {reader}: {read.stderr}")
+    for scene, viewpoint in ((folder / "s.obj", "10,4,7"), ("builtin:sphere:0.5", "0,0,0")):
+        for maker, reader in ((portable, fast), (fast, portable)):
+            made = run(maker, "precompute", scene, "-o", folder / "s", "--viewpoint", viewpoint,
+                       "--coarse-radius", 4, "--receiver-levels", 3, "--sender-levels", 2, "--rays", 16,
+                       "--no-verification", "--quiet", environment=PLAIN)
+            expect(made.returncode == 0, f"precompute: {made.stderr}")
+            read = run(reader, "query", folder / "s", "--points", folder / "points.csv", "-o", folder / "e.csv",
+                       "--quiet", *light, environment=PLAIN)
+            expect(read.returncode == 0, f"a file of {maker} is refused by {reader}: {scene}: {read.stderr}")
 
 print("runs on qemu64 and Nehalem, and as its twin with AVX2")

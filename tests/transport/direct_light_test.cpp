@@ -4,22 +4,27 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace afterglow {
 namespace {
 
 using std::numbers::pi;
 
+constexpr const char* furnace = "builtin:furnace:0.5";
+
 /// A closed box of two metres with reflectance 1/2 and senders on it.
 struct LitFurnace {
-    Scene scene = make_builtin_scene("builtin:furnace:0.5");
+    Scene scene;
     Surface surface{scene};
     TransferOperator transfer;
     DirectLight direct{transfer.points, transfer.sender_levels - 1, transfer.sender_areas, surface};
 
-    explicit LitFurnace(float coarse_radius) : transfer(precompute(surface, options(coarse_radius))) {}
+    explicit LitFurnace(float coarse_radius, Scene of = make_builtin_scene(furnace))
+        : scene(std::move(of)), transfer(precompute(surface, options(coarse_radius))) {}
 
     static PrecomputeOptions options(float coarse_radius) {
         PrecomputeOptions options;
@@ -57,6 +62,20 @@ const LitFurnace& finer_example() {
     return made;
 }
 
+/// The furnace with shading normals that all lean by so many degrees from the triangles' own.
+Scene leaning_furnace(float degrees) {
+    Scene scene = make_builtin_scene(furnace);
+    const float angle = degrees * static_cast<float>(pi / 180.0);
+    for (const Triangle& t : scene.triangles) {
+        const Vec3& a = scene.positions[t[0]];
+        const Frame frame((scene.positions[t[1]] - a).cross(scene.positions[t[2]] - a).normalized());
+        const auto n = static_cast<std::uint32_t>(scene.normals.size());
+        scene.normals.push_back(frame.to_world({std::sin(angle), 0.0f, std::cos(angle)}));
+        scene.normal_indices.push_back({n, n, n});
+    }
+    return scene;
+}
+
 Spotlight spot(const Vec3& position, const Vec3& direction, float angle) {
     Spotlight light{.position = position,
                     .direction = direction,
@@ -68,7 +87,7 @@ Spotlight spot(const Vec3& position, const Vec3& direction, float angle) {
 }
 
 double flux(const Spotlight& light) {
-    return light.intensity[1] * 2.0 * pi * (1.0 - std::cos(light.outer_angle * pi / 180.0));
+    return light.intensity[1] * 2.0 * pi * (1.0 - cos_degrees(light.outer_angle)); // a float, as falloff() has it
 }
 
 TEST(DirectLight, SharesGoFromSplattedToSampledWithTheWidthOfWhatIsLit) {
@@ -96,6 +115,28 @@ TEST(DirectLight, LosesNoneOfATightOrCloseLight) {
         const Spotlight light = spot(c.position, c.direction, c.angle);
         EXPECT_NEAR(example().power(example().radiosity(light)) / (0.5 * flux(light)), 1.0, 0.03)
             << c.position.transpose() << ", " << c.angle << " degrees";
+    }
+}
+
+TEST(DirectLight, LosesNoneOnAnEdge) {
+    // There lie functions that no receiver sees, for they are small in the rows of all patches.
+    const auto unseen = std::ranges::count(example().transfer.sender_areas, 0.0f);
+    ASSERT_GT(unseen, 0);
+    for (int k = 0; k < 60; ++k) {
+        const float along = -0.99f + 1.98f * static_cast<float>(k) / 59.0f;
+        const Spotlight light = spot(Vec3(0.1f, 0.2f, -0.3f), Vec3(along, -1.0f, 1.0f) - Vec3(0.1f, 0.2f, -0.3f), 0.1f);
+        EXPECT_NEAR(example().power(example().radiosity(light)) / (0.5 * flux(light)), 1.0, 0.001) << along;
+    }
+}
+
+TEST(DirectLight, CountsWhatFallsOnTheShadingNormal) {
+    // Straight down from close by, so that all is splatted: irradiance is less by the cosine of the lean.
+    constexpr float lean = 40.0f;
+    const LitFurnace leaning(0.4f, leaning_furnace(lean));
+    const double cosine = std::cos(lean * pi / 180.0);
+    for (const float spacings : {2.0f, 3.5f}) {
+        const Spotlight light = spot(Vec3(0.1f, spacings * leaning.spacing() - 1.0f, 0.2f), -Vec3::UnitY(), 1.0f);
+        EXPECT_NEAR(leaning.power(leaning.radiosity(light)) / (0.5 * flux(light)), cosine, 0.002) << spacings;
     }
 }
 

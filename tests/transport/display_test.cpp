@@ -1,13 +1,17 @@
 #include "core/builtin_scenes.h"
+#include "core/sampling.h"
 #include "tests/support/small_transfer.h"
 #include "tests/support/surface_samples.h"
 #include "transport/display.h"
+#include "transport/path_tracer.h"
 #include "transport/precompute.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
+#include <vector>
 
 namespace afterglow {
 namespace {
@@ -65,6 +69,48 @@ TEST(Display, IsTheBasisTimesTheFieldDottedWithTheNormal) {
         const Rgb expected = std::max(0.0f, x.normal.y()) * Rgb(1.0f, 2.0f, 3.0f);
         EXPECT_LT((e - expected).abs().maxCoeff(), 1e-4f) << x.normal.transpose();
     }
+}
+
+TEST(Display, TakesNoLightFromBelowTheSurfaceUnderANormalMap) {
+    // In a slot of 3 cm over the floor, with a normal that leans by 75 degrees towards its mouth.
+    Scene scene = make_builtin_scene("builtin:furnace:0.5");
+    const auto first = static_cast<std::uint32_t>(scene.positions.size());
+    for (const Vec3& corner : {Vec3(-1, -0.97f, -1), Vec3(0, -0.97f, -1), Vec3(0, -0.97f, 1), Vec3(-1, -0.97f, 1)})
+        scene.positions.push_back(corner);
+    for (const Triangle& t : {Triangle{first, first + 1, first + 2}, Triangle{first, first + 2, first + 3}}) {
+        scene.triangles.push_back(t);
+        scene.material_index.push_back(0);
+    }
+    const Surface surface(scene);
+    const TransferOperator transfer = precompute(surface, medium_options());
+    const Display display(transfer, surface);
+    Spotlight light{.position = {0.5f, 0.5f, 0.0f}, .direction = {0.2f, -1.0f, 0.1f}, .inner_angle = 30.0f, .outer_angle = 40.0f};
+    light.check();
+    const VectorIrradiance field = LightTransport(transfer, surface).indirect(light);
+    const float lean = 75.0f * static_cast<float>(EIGEN_PI / 180.0);
+    const SurfacePoint x{{-0.05f, -1.0f, 0.1f}, Vec3::UnitY()};
+    const Vec3 shown(std::sin(lean), std::cos(lean), 0.0f);
+    bool covered = false;
+    const Rgb found = display.irradiance(x, shown, field, light, covered, 4096);
+    ASSERT_FALSE(((display.irradiance(x, shown, field, light, covered, 0) - found).abs() < 1e-6f).all()) << "not in a gap";
+
+    // The oracle: the radiosity of all that is seen above the surface, by the path tracer.
+    constexpr Index directions = 4096;
+    std::vector<SurfacePoint> seen;
+    std::vector<Rgb> reflectance;
+    for (Index k = 0; k < directions; ++k) {
+        const Vec3 direction = Frame(shown).to_world(sample_cosine(scrambled_sobol2(static_cast<std::uint32_t>(k), 99)));
+        if (direction.dot(x.normal) <= 0.0f) continue;
+        const Hit hit = surface.closest_hit({surface.lifted(x), direction});
+        ASSERT_TRUE(hit);
+        seen.push_back(surface.point(hit));
+        reflectance.push_back(surface.reflectance(hit));
+    }
+    const IrradianceEstimate of_seen = estimate_irradiance(surface, {&light, 1}, seen, {.samples = 64});
+    Rgb wanted = Rgb::Zero();
+    for (std::size_t k = 0; k < seen.size(); ++k)
+        wanted += reflectance[k] * (of_seen.direct.col(k) + of_seen.indirect.col(k)) / static_cast<float>(directions);
+    EXPECT_NEAR(found.mean() / wanted.mean(), 1.0f, 0.04f);
 }
 
 TEST(Display, ReadsTheFinestLevelAlone) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
@@ -63,6 +64,15 @@ TEST(MeanEstimator, GivesUpAtTheLargestNumberOfSamples) {
         estimate_means(8, 2, exponential, {.target_error = 1e-6, .max_samples = 4096, .seed = 4});
     EXPECT_GT(e.relative_error[0], 1e-6);
     EXPECT_LE(e.samples, 8u * (4096u + 16u * 8u + 128u));
+}
+
+TEST(MeanEstimator, KeepsToASmallBudget) {
+    // Of 16 batches that have a sample each and of 8 of the pilot, which has a quarter of the budget.
+    for (const Index budget : {16, 37, 64, 200}) {
+        const MeanEstimate e =
+            estimate_means(8, 2, exponential, {.target_error = 1e-6, .max_samples = budget, .seed = 4});
+        EXPECT_LE(e.samples, 8 * (budget + 16 + std::max<Index>(8, budget / 4))) << budget;
+    }
 }
 
 TEST(MeanEstimator, BlackItemsHaveNoErrorAndReachAnyTarget) {

@@ -2,12 +2,17 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "tests/support/small_transfer.h"
+#include "tests/support/surface_samples.h"
+#include "transport/display.h"
+#include "transport/path_tracer.h"
 #include "transport/precompute.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 namespace afterglow {
 namespace {
@@ -95,6 +100,32 @@ TEST(Precompute, StaysInSightOfAGivenViewpoint) {
     const TransferOperator both = precompute(surface, options);
     EXPECT_LT(both.points.position.row(0).minCoeff(), 1.0f);
     EXPECT_GT(both.points.position.row(0).maxCoeff(), 7.0f);
+}
+
+TEST(Precompute, FindsARoomWhoseFloorReachesFar) {
+    // A furnace whose floor is one quad of 800 m, its viewpoint and size found by itself.
+    Scene scene = make_builtin_scene("builtin:furnace:0.5");
+    const auto first = static_cast<std::uint32_t>(scene.positions.size());
+    for (const Vec3& corner : {Vec3(-400, -1, -400), Vec3(-400, -1, 400), Vec3(400, -1, 400), Vec3(400, -1, -400)})
+        scene.positions.push_back(corner);
+    std::vector<Triangle> triangles{{first, first + 1, first + 2}, {first, first + 2, first + 3}};
+    for (const Triangle& t : scene.triangles)
+        if (!std::ranges::all_of(t, [&](std::uint32_t v) { return scene.positions[v].y() == -1.0f; }))
+            triangles.push_back(t);
+    ASSERT_EQ(triangles.size(), scene.triangles.size());
+    scene.triangles = triangles;
+    scene.viewpoint.reset();
+    const Surface surface(scene);
+    const TransferOperator transfer = precompute(surface, medium_options());
+
+    Spotlight light{.position = {0.1f, 0.6f, 0.0f}, .direction = {0.1f, -1.0f, 0.2f}, .inner_angle = 30.0f, .outer_angle = 40.0f};
+    light.check();
+    const std::vector<SurfacePoint> places = points_in_sight(surface, Vec3::Zero(), 300, 5);
+    const Eigen::Array3Xf wanted = estimate_irradiance(surface, {&light, 1}, places, {.samples = 256}).indirect;
+    const Eigen::Array3Xf found = Display(transfer, surface)
+                                      .irradiance(places, LightTransport(transfer, surface).indirect(light), light);
+    EXPECT_NEAR(found.mean() / wanted.mean(), 1.0f, 0.05f);
+    EXPECT_LT(std::sqrt((found - wanted).square().mean()) / wanted.mean(), 0.15f);
 }
 
 TEST(Precompute, FewRaysMakeNeitherLightNorLinks) {
