@@ -144,12 +144,10 @@ MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
     }
 
     constexpr int pilot_batches = 8;
-    constexpr double most_of_budget = 0.25;
-    const Index pilot_samples = // a batch
-        std::clamp<Index>(static_cast<Index>(most_of_budget * static_cast<double>(options.max_samples)) / pilot_batches, 1, 16);
+    constexpr Index pilot_samples = 16; // a batch
     BatchSums pilot(items, outputs, pilot_batches, hash64(options.seed, 2));
     pilot.extend(
-        sampler, [&](Index) { return pilot_samples; }, nullptr);
+        sampler, [](Index) { return pilot_samples; }, nullptr);
     const MeanEstimate first = pilot.estimate();
     const std::vector<double> share = shares(first, items, outputs);
 

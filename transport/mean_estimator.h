@@ -14,7 +14,7 @@ struct EstimatorOptions {
     Index samples = 1024; // an item, rounded up to a multiple of `batches`
     double target_error =
         0.0; // if > 0: as many samples as bring every output's relative error below
-    Index max_samples = 1 << 22; // mean number an item at which a run for target_error gives up
+    Index max_samples = 1 << 22; // mean number an item, the pilot's apart, at which a run for target_error gives up
     int batches = 16; // independent repetitions from which the error is estimated, at least 2
     std::uint64_t seed = 1;
     std::function<void(double)> progress = {}; // called now and then with the share that is done
@@ -36,7 +36,8 @@ struct MeanEstimate {
 /// Each of the batches of an item follows a randomised sequence of its own, so that their spread
 /// measures the error of quasi-random samples too, to which a sample variance is blind.
 ///
-/// For a target error, a pilot of at most a quarter of `max_samples`, whose samples are then thrown away (with them, items whose first
+/// For a target error, a pilot of 128 samples an item (also where `max_samples` is less: a smaller one knows
+/// too little of s_i to pay), whose samples are then thrown away (with them, items whose first
 /// samples happened to be small would get few more of them and the means were biased) gives the
 /// standard deviation s_i of each item; N samples in all are shared out as n_i ~ s_i, which has the
 /// least sum of s_i^2 / n_i (Neyman 1934). N grows until the measured error is small enough; that
