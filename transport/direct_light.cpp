@@ -236,23 +236,25 @@ void DirectLight::sample(const Spotlight& light, std::span<float> result) const 
 
 void DirectLight::keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row) const {
     const std::uint32_t begin = points_.begin(level_);
-    std::erase_if(row, [&](const BasisEntry& entry) { return areas_[entry.index - begin] == 0.0f; });
-    if (!row.empty()) {
-        make_sum_one(row);
-        return;
+    float kept = 0.0f, in_no_row = 0.0f;
+    for (const BasisEntry& entry : row) {
+        const float area = areas_[entry.index - begin];
+        if (area > 0.0f) kept += entry.value;
+        if (area == SenderRows::in_no_row) in_no_row += entry.value;
     }
+    std::erase_if(row, [&](const BasisEntry& entry) { return !(areas_[entry.index - begin] > 0.0f); });
+    for (BasisEntry& entry : row) entry.value *= (kept + in_no_row) / kept;
+    if (!row.empty() || in_no_row == 0.0f) return;
     constexpr int most = 32;
-    constexpr float reach = 4.0f; // spacings
     thread_local std::vector<std::uint32_t> near;
     near.clear();
     nearest().closest(y.position, most, near);
     for (const std::uint32_t k : near) {
         const SurfacePoint other = points_.point(begin + k);
-        if ((other.position - y.position).norm() > reach * points_.spacing[level_]) return;
-        if (areas_[k] == 0.0f || other.normal.dot(y.normal) <= 0.5f
+        if (!(areas_[k] > 0.0f) || other.normal.dot(y.normal) <= 0.5f
             || surface_.blocked(surface_.lifted(y), surface_.lifted(other)))
             continue;
-        row.push_back({begin + k, 1.0f});
+        row.push_back({begin + k, in_no_row});
         return;
     }
 }

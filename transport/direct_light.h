@@ -32,14 +32,14 @@ namespace afterglow {
 ///
 ///     b_j += sum_k rho(y_k) (1 - p) Phi_k B_j(y_k) / <B_j, 1>,
 ///
-/// which loses no light however small the lit place is. Functions that are seen nowhere have no part in it;
-/// where all that reach y_k are such, the closest one that is seen has it all. Rays end where p = 1, so that
+/// which loses no light however small the lit place is. Light on functions
+/// that are seen nowhere is dropped; that on functions on edges, SenderRows::in_no_row, goes to the others at y_k,
+/// or, where there are none, to the closest one. Rays end where p = 1, so that
 /// they cost nothing where the light is far from everything. Of the 8192, so many of their sequence's first
 /// ones count where they end, each with as much more flux, that 64 (1 - p)^2 fall on a sender.
 class DirectLight {
 public:
-    /// The senders of one level; `areas`: <B_j, 1> of each [world^2], 0 where none was seen. Keeps
-    /// references.
+    /// The senders of one level; `areas`: SenderRows::finest_areas(). Keeps references.
     DirectLight(const PointHierarchy& points, int level, std::span<const float> areas,
                 const Surface& surface);
 
@@ -80,7 +80,7 @@ private:
     Rgb mean_irradiance(const Spotlight& light, const Falloff& falloff, Index k) const;
     void sample(const Spotlight& light, std::span<float> result) const;
     void splat(const Spotlight& light, std::span<float> result) const;
-    /// Leaves in a row at y the functions that have an area.
+    /// Leaves in a row at y the functions that have an area, and gives them what those on edges had.
     void keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row) const;
 };
 

@@ -62,8 +62,10 @@ public:
     /// To be called once: what was counted is forgotten, for it takes memory.
     PullOperator make_pull_operator();
     /// <B_j, 1> of the finest level's functions [world^2], over the patches of which rows were made:
-    /// those that are seen.
+    /// those that are seen. `in_no_row` of a function that has no part in any, though its own patch is seen:
+    /// one on an edge, of which a hundred or less is seen from its patches' centres.
     std::vector<float> finest_areas() const;
+    static constexpr float in_no_row = -1.0f;
 
     std::size_t made() const { return begin_.size() - 1; }
     std::vector<std::uint32_t> made_numbers() const; // rising

@@ -36,7 +36,7 @@ struct TransferOperator {
     int bounces = 0;   // of indirect light, 0: all of them
 
     PushOperator push; // neumann
-    std::vector<float> sender_areas; // neumann: <B_j, 1> of the finest senders [world^2]
+    std::vector<float> sender_areas; // neumann: SenderRows::finest_areas()
     Links links;       // neumann: T
 
     Pyramid pyramid;    // paper: of the senders

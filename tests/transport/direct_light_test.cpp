@@ -46,7 +46,7 @@ struct LitFurnace {
     double power(const Radiosity& radiosity) const {
         double sum = 0.0;
         for (std::size_t j = 0; j < transfer.sender_areas.size(); ++j)
-            sum += static_cast<double>(radiosity[3 * j + 1]) * transfer.sender_areas[j];
+            sum += static_cast<double>(radiosity[3 * j + 1]) * std::max(0.0f, transfer.sender_areas[j]);
         return sum;
     }
 };
@@ -120,8 +120,7 @@ TEST(DirectLight, LosesNoneOfATightOrCloseLight) {
 
 TEST(DirectLight, LosesNoneOnAnEdge) {
     // There lie functions that no receiver sees, for they are small in the rows of all patches.
-    const auto unseen = std::ranges::count(example().transfer.sender_areas, 0.0f);
-    ASSERT_GT(unseen, 0);
+    ASSERT_GT(std::ranges::count(example().transfer.sender_areas, SenderRows::in_no_row), 0);
     for (int k = 0; k < 60; ++k) {
         const float along = -0.99f + 1.98f * static_cast<float>(k) / 59.0f;
         const Spotlight light = spot(Vec3(0.1f, 0.2f, -0.3f), Vec3(along, -1.0f, 1.0f) - Vec3(0.1f, 0.2f, -0.3f), 0.1f);
