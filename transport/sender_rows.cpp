@@ -281,9 +281,8 @@ std::vector<float> SenderRows::finest_areas() const {
     parallel_for(static_cast<Index>(areas.size()), [&](Index k) {
         if (areas[k] > 0.0f) return;
         const SurfacePoint x = basis_.points().point(begin + k);
-        const float above = surface_.lift();
-        const Hit own = surface_.closest_hit({surface_.lifted(x), -x.normal, 4.0f * above});
-        if (own && is_made(this->number(own, finest))) areas[k] = in_no_row;
+        const Hit own = surface_.closest_hit({surface_.lifted(x), -x.normal, 4.0f * surface_.lift()});
+        if (own && is_made(number(own, finest))) areas[k] = in_no_row;
     }, 64);
     return areas;
 }

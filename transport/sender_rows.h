@@ -63,7 +63,7 @@ public:
     PullOperator make_pull_operator();
     /// <B_j, 1> of the finest level's functions [world^2], over the patches of which rows were made:
     /// those that are seen. `in_no_row` of a function that has no part in any, though its own patch is seen:
-    /// one on an edge, of which a hundred or less is seen from its patches' centres.
+    /// one on an edge, whose shares at patches' centres are so small that they are dropped.
     std::vector<float> finest_areas() const;
     static constexpr float in_no_row = -1.0f;
 
