@@ -236,27 +236,25 @@ void DirectLight::sample(const Spotlight& light, std::span<float> result) const 
 
 void DirectLight::keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row) const {
     const std::uint32_t begin = points_.begin(level_);
-    float kept = 0.0f, in_no_row = 0.0f;
-    for (const BasisEntry& entry : row) {
-        const float area = areas_[entry.index - begin];
-        if (area > 0.0f) kept += entry.value;
-        if (area == SenderRows::in_no_row) in_no_row += entry.value;
-    }
+    float on_edge = 0.0f;
+    for (const BasisEntry& entry : row)
+        if (areas_[entry.index - begin] == SenderRows::in_no_row) on_edge += entry.value;
     std::erase_if(row, [&](const BasisEntry& entry) { return !(areas_[entry.index - begin] > 0.0f); });
-    for (BasisEntry& entry : row) entry.value *= (kept + in_no_row) / kept;
-    if (!row.empty() || in_no_row == 0.0f) return;
-    constexpr int most = 32;
+    if (on_edge == 0.0f) return;
+    // By area, so that all are equally bright: one alone may be seen but in a corner of it, and would glare.
+    constexpr int looked_at = 24;
+    constexpr std::size_t most = 4;
     thread_local std::vector<std::uint32_t> near;
-    near.clear();
-    nearest().closest(y.position, most, near);
-    for (const std::uint32_t k : near) {
+    nearest().closest(y.position, looked_at, near);
+    std::erase_if(near, [&](std::uint32_t k) {
         const SurfacePoint other = points_.point(begin + k);
-        if (!(areas_[k] > 0.0f) || other.normal.dot(y.normal) <= 0.5f
-            || surface_.blocked(surface_.lifted(y), surface_.lifted(other)))
-            continue;
-        row.push_back({begin + k, in_no_row});
-        return;
-    }
+        return !(areas_[k] > 0.0f) || other.normal.dot(y.normal) <= 0.5f
+               || surface_.blocked(surface_.lifted(y), surface_.lifted(other));
+    });
+    near.resize(std::min(near.size(), most));
+    float area = 0.0f;
+    for (const std::uint32_t k : near) area += areas_[k];
+    for (const std::uint32_t k : near) row.push_back({begin + k, on_edge * areas_[k] / area});
 }
 
 void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
