@@ -66,10 +66,8 @@ const LitFurnace& finer_example() {
 Scene leaning_furnace(float degrees) {
     Scene scene = make_builtin_scene(furnace);
     const float angle = degrees * static_cast<float>(pi / 180.0);
-    for (const Triangle& t : scene.triangles) {
-        const Vec3& a = scene.positions[t[0]];
-        const Frame frame((scene.positions[t[1]] - a).cross(scene.positions[t[2]] - a).normalized());
-        const auto n = static_cast<std::uint32_t>(scene.normals.size());
+    for (std::uint32_t n = 0; n < scene.triangles.size(); ++n) {
+        const Frame frame(scene.triangle_normal(n));
         scene.normals.push_back(frame.to_world({std::sin(angle), 0.0f, std::cos(angle)}));
         scene.normal_indices.push_back({n, n, n});
     }
