@@ -54,6 +54,13 @@ Vec2 shuffled_sobol2(std::uint32_t index, std::uint64_t seed) {
     return scrambled_sobol2(owen_scramble(index, order), seed);
 }
 
+Vec2 spiral_point(float k, int count, float turn) {
+    constexpr float golden_section = 0.38196601f;
+    const float radius = std::sqrt(k / static_cast<float>(count));
+    const float phi = two_pi * (turn + golden_section * k);
+    return {radius * std::cos(phi), radius * std::sin(phi)};
+}
+
 Vec3 sample_cosine(const Vec2& u) {
     return from_polar(std::sqrt(1.0f - u.x()), two_pi * u.y());
 }

@@ -64,6 +64,10 @@ struct Frame {
     Vec3 to_world(const Vec3& v) const { return v.x() * x + v.y() * y + v.z() * z; }
 };
 
+/// Place k of `count` on the unit disc, equally many on equal areas: a spiral by the golden section (Vogel
+/// 1979) from the centre, where k = 0 is. `turn`: of the whole, in turns.
+Vec2 spiral_point(float k, int count, float turn = 0.0f);
+
 /// Direction about +z with density cos(theta) / pi.
 Vec3 sample_cosine(const Vec2& u);
 

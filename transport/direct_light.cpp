@@ -15,7 +15,6 @@ constexpr float only_splatted = 4.0f, only_sampled = 10.0f; // s / R
 constexpr std::uint32_t splatted_rays = 1 << 13;
 constexpr float rays_a_sender = 64.0f; // that count, where all is splatted; of all rays at least:
 constexpr float least_share = 1.0f / 8.0f;
-constexpr float golden_section = 0.38196601f; // of a turn, between places one after the other
 
 float radians(float degrees) {
     return degrees * static_cast<float>(EIGEN_PI / 180.0);
@@ -193,9 +192,8 @@ Rgb DirectLight::mean_irradiance(const Spotlight& light, const Falloff& falloff,
     centre.fill(surface_.lifted(x));
     target.fill(light.position);
     for (std::size_t s = 0; s < count; ++s) {
-        const float radius = share_of_spacing * size * std::sqrt((s + 0.5f) / count);
-        const float phi = 2.0f * static_cast<float>(EIGEN_PI) * (turn + golden_section * s);
-        place[s] = centre[s] + frame.to_world({radius * std::cos(phi), radius * std::sin(phi), 0.0f});
+        const Vec2 at = share_of_spacing * size * spiral_point(static_cast<float>(s) + 0.5f, count, turn);
+        place[s] = centre[s] + frame.to_world({at.x(), at.y(), 0.0f});
     }
     std::uint16_t apart = apart_[static_cast<std::size_t>(k)].load(std::memory_order_relaxed);
     if (apart == apart_unknown) {
@@ -238,7 +236,7 @@ void DirectLight::keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row)
     const std::uint32_t begin = points_.begin(level_);
     float on_edge = 0.0f;
     for (const BasisEntry& entry : row)
-        if (areas_[entry.index - begin] == SenderRows::in_no_row) on_edge += entry.value;
+        if (areas_[entry.index - begin] == SenderRows::in_few_rows) on_edge += entry.value;
     std::erase_if(row, [&](const BasisEntry& entry) { return !(areas_[entry.index - begin] > 0.0f); });
     if (on_edge == 0.0f) return;
     // By area, so that all are equally bright: one alone may be seen but in a corner of it, and would glare.

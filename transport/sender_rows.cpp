@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/sampling.h"
 #include "transport/accumulator.h"
 
 #include <algorithm>
@@ -278,13 +279,43 @@ std::vector<float> SenderRows::finest_areas() const {
         add(second, share * grid.area(patch));
     }
     std::vector<float> areas(area.begin(), area.end());
+    const float spacing = basis_.points().spacing[finest];
     parallel_for(static_cast<Index>(areas.size()), [&](Index k) {
-        if (areas[k] > 0.0f) return;
-        const SurfacePoint x = basis_.points().point(begin + k);
-        const Hit own = surface_.closest_hit({surface_.lifted(x), -x.normal, 4.0f * surface_.lift()});
-        if (own && is_made(number(own, finest))) areas[k] = in_no_row;
-    }, 64);
+        constexpr float small = 0.2f, least_share = 0.5f;
+        if (areas[k] > small * spacing * spacing) return;
+        const std::uint32_t point = begin + static_cast<std::uint32_t>(k);
+        if (areas[k] == 0.0f ? is_seen(point) : areas[k] < least_share * area_around(point)) areas[k] = in_few_rows;
+    }, 16);
     return areas;
+}
+
+bool SenderRows::is_seen(std::uint32_t point) const {
+    const SurfacePoint x = basis_.points().point(point);
+    const Hit own = surface_.closest_hit({surface_.lifted(x), -x.normal, 4.0f * surface_.lift()});
+    return own && is_made(number(own, levels() - 1));
+}
+
+float SenderRows::area_around(std::uint32_t point) const {
+    constexpr int count = 32;
+    constexpr float depth = 0.25f, least_cosine = 0.2f;
+    const int finest = levels() - 1;
+    const SurfacePoint x = basis_.points().point(point);
+    const float radius = basis_.points().support[point];
+    const Frame frame(x.normal);
+    const Vec3 above = surface_.lifted(x);
+    std::vector<BasisEntry> row;
+    double sum = 0.0;
+    for (int k = 0; k < count; ++k) {
+        const Vec2 at = radius * spiral_point(static_cast<float>(k), count);
+        const Vec3 from = above + frame.to_world({at.x(), at.y(), 0.0f});
+        const Hit hit = surface_.closest_hit({from, -x.normal, depth * radius});
+        if (!hit || !is_made(number(hit, finest))) continue;
+        row.clear();
+        sender_row(surface_, basis_, finest, hit, row);
+        for (const BasisEntry& entry : row)
+            if (entry.index == point) sum += entry.value / std::max(least_cosine, hit.cosine);
+    }
+    return static_cast<float>(EIGEN_PI * radius * radius / count * sum);
 }
 
 } // namespace afterglow

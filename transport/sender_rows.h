@@ -62,10 +62,10 @@ public:
     /// To be called once: what was counted is forgotten, for it takes memory.
     PullOperator make_pull_operator();
     /// <B_j, 1> of the finest level's functions [world^2], over the patches of which rows were made:
-    /// those that are seen. `in_no_row` of a function that has no part in any, though its own patch is seen:
-    /// one on an edge, whose shares at patches' centres are so small that they are dropped.
+    /// those that are seen. `in_few_rows` of a function on an edge, of which patches' centres see less than
+    /// half of what there is around its point: that small area would glare under all the light that falls there.
     std::vector<float> finest_areas() const;
-    static constexpr float in_no_row = -1.0f;
+    static constexpr float in_few_rows = -1.0f;
 
     std::size_t made() const { return begin_.size() - 1; }
     std::vector<std::uint32_t> made_numbers() const; // rising
@@ -98,6 +98,10 @@ private:
     Hit centre(std::uint32_t number) const;
     bool hidden(const SurfacePoint& x, const SurfacePoint& centre, float relief) const;
     std::uint32_t side_of(const Hit& hit, std::uint32_t first) const;
+    /// Whether a row of the patch that a finest point lies on was made.
+    bool is_seen(std::uint32_t point) const;
+    /// <B_j, 1> of a finest function from places on its support, where patches are seen: to about a third.
+    float area_around(std::uint32_t point) const;
 };
 
 /// Appends the row of a finest level at any hit, not at a patch's centre; none where evaluate_or_nearest

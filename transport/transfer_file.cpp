@@ -235,7 +235,7 @@ private:
         const std::uint64_t first = transfer.points.begin(transfer.sender_levels - 1);
         const auto areas = tensor<float>("senders.area", {transfer.senders() - first});
         if (!std::all_of(areas.begin(), areas.end(),
-                         [](float x) { return (x >= 0.0f && std::isfinite(x)) || x == SenderRows::in_no_row; }))
+                         [](float x) { return (x >= 0.0f && std::isfinite(x)) || x == SenderRows::in_few_rows; }))
             fail("has a sender of no finite area");
         transfer.sender_areas.assign(areas.begin(), areas.end());
     }

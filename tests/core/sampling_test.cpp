@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
 #include <vector>
 
@@ -87,6 +90,19 @@ TEST(Rng, GivesUniformNumbersInEveryStream) {
     const double n = 2.0 * streams;
     EXPECT_NEAR(sum / n, 0.5, 5.0 * std::sqrt(1.0 / 12.0 / n));
     EXPECT_NEAR(squares / n, 1.0 / 3.0, 5.0 * std::sqrt(4.0 / 45.0 / n));
+}
+
+TEST(SpiralPoint, PutsEquallyManyOnEqualAreas) {
+    constexpr int count = 1024, rings = 8, sectors = 8;
+    std::array<int, rings * sectors> in{};
+    for (int k = 0; k < count; ++k) {
+        const Vec2 at = spiral_point(static_cast<float>(k) + 0.5f, count, 0.3f);
+        const auto ring = std::min(rings - 1, static_cast<int>(rings * at.squaredNorm()));
+        const auto turn = std::atan2(at.y(), at.x()) / (2.0f * static_cast<float>(EIGEN_PI)) + 0.5f;
+        ++in[static_cast<std::size_t>(sectors * ring + std::min(sectors - 1, static_cast<int>(sectors * turn)))];
+    }
+    for (const int n : in) EXPECT_NEAR(n, count / (rings * sectors), 2);
+    EXPECT_EQ(spiral_point(0.0f, 5), Vec2::Zero());
 }
 
 TEST(Frame, IsOrthonormalAndRightHanded) {

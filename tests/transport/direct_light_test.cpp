@@ -118,11 +118,30 @@ TEST(DirectLight, LosesNoneOfATightOrCloseLight) {
 
 TEST(DirectLight, LosesNoneOnAnEdge) {
     // There lie functions that no receiver sees, for they are small in the rows of all patches.
-    ASSERT_GT(std::ranges::count(example().transfer.sender_areas, SenderRows::in_no_row), 0);
+    ASSERT_GT(std::ranges::count(example().transfer.sender_areas, SenderRows::in_few_rows), 0);
     for (int k = 0; k < 60; ++k) {
         const float along = -0.99f + 1.98f * static_cast<float>(k) / 59.0f;
         const Spotlight light = spot(Vec3(0.1f, 0.2f, -0.3f), Vec3(along, -1.0f, 1.0f) - Vec3(0.1f, 0.2f, -0.3f), 0.1f);
         EXPECT_NEAR(example().power(example().radiosity(light)) / (0.5 * flux(light)), 1.0, 0.001) << along;
+    }
+}
+
+TEST(DirectLight, GlaresOnNoEdge) {
+    // Spots a few functions wide along an edge, all splatted: no function of it, however little patches'
+    // centres see of it, becomes brighter than the brightest place.
+    const Vec3 from(0.1f, 0.2f, -0.3f);
+    for (int k = 0; k < 60; ++k) {
+        const Vec3 on_edge(-0.99f + 1.98f * static_cast<float>(k) / 59.0f, -1.0f, 1.0f);
+        const Spotlight light = spot(from, on_edge - from, 7.0f);
+        ASSERT_EQ(sampled_share(light, (on_edge - from).norm(), example().spacing()), 0.0f);
+        const Radiosity radiosity = example().radiosity(light);
+        float brightest = 0.0f;
+        for (std::size_t j = 0; j < radiosity.size() / 3; ++j) {
+            SurfacePoint x = example().transfer.points.point(example().begin() + static_cast<std::uint32_t>(j));
+            brightest = std::max(brightest, 0.5f * direct_irradiance(example().surface, light, x)[1]);
+        }
+        for (std::size_t j = 1; j < radiosity.size(); j += 3)
+            EXPECT_LE(radiosity[j], 2.5f * brightest) << on_edge.transpose();
     }
 }
 

@@ -2,6 +2,7 @@
 #include "core/sampling.h"
 #include "tests/support/gather_oracle.h"
 #include "tests/support/surface_samples.h"
+#include "transport/precompute.h"
 #include "transport/sender_rows.h"
 
 #include <gtest/gtest.h>
@@ -21,15 +22,16 @@ struct RowsExample {
     PointHierarchy points;
     ShepardBasis basis;
 
-    explicit RowsExample(const std::string& name, float coarse_radius)
+    explicit RowsExample(const std::string& name, float coarse_radius, float finest_density = 0.0f)
         : scene(make_builtin_scene(name)), surface(scene),
-          points(make_points(surface, coarse_radius)), basis(points, surface, true) {}
+          points(make_points(surface, coarse_radius, finest_density)), basis(points, surface, true) {}
 
-    static PointHierarchy make_points(const Surface& surface, float coarse_radius) {
+    static PointHierarchy make_points(const Surface& surface, float coarse_radius, float finest_density) {
         CandidateSource source(surface, {*surface.scene().viewpoint}, 1);
         HierarchyOptions options;
         options.coarse_radius = coarse_radius;
         options.levels = 3;
+        options.finest_density = finest_density;
         return build_hierarchy(source, options);
     }
 };
@@ -280,6 +282,41 @@ TEST(SenderRows, FinestAreasAddUpToTheSurface) {
         sum += area;
     }
     EXPECT_NEAR(sum, 24.0, 0.01);
+}
+
+TEST(SenderRows, FinestAreasGlareNowhere) {
+    // An area by patches' centres is to be compared with one by many places: never much less. Functions lie close
+    // together at the edges.
+    const RowsExample example("builtin:furnace", 0.8f, PrecomputeOptions{}.sender_density);
+    SenderRows rows(example.surface, example.basis, 3);
+    const std::vector<Hit> hits = hits_on_fronts(example.scene, 20'000, 5);
+    const double area_of_hit = 24.0 / static_cast<double>(hits.size());
+    rows.require(numbers_of(rows, hits));
+    const std::vector<float> areas = rows.finest_areas();
+    std::vector<double> true_area(areas.size());
+    std::vector<BasisEntry> row;
+    for (const Hit& hit : hits) {
+        row.clear();
+        sender_row(example.surface, example.basis, 2, hit, row);
+        for (const BasisEntry& entry : row)
+            if (entry.index >= example.points.begin(2))
+                true_area[entry.index - example.points.begin(2)] += area_of_hit * entry.value;
+    }
+    int marked = 0;
+    double sum = 0.0;
+    for (std::uint32_t k = 0; k < areas.size(); ++k) {
+        if (areas[k] != SenderRows::in_few_rows) {
+            EXPECT_GT(areas[k], 0.3 * true_area[k]) << k;
+            sum += areas[k];
+            continue;
+        }
+        ++marked; // it lies on an edge, close to two walls
+        Vec3 from_wall = Vec3::Ones() - Vec3(example.points.position.col(example.points.begin(2) + k).cwiseAbs());
+        std::ranges::sort(from_wall);
+        EXPECT_LT(from_wall[1], 0.25f * example.points.spacing[2]) << from_wall.transpose();
+    }
+    EXPECT_GT(marked, 0);
+    EXPECT_NEAR(sum, 24.0, 0.01 * 24.0); // next to nothing went with them
 }
 
 TEST(SenderRows, LeaveFunctionsThatNoRayMetAsTheyAre) {
