@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
-/// What each harness defines: it hands the bytes to one reader. libFuzzer calls it with what it makes up,
-/// the program of replay.cpp with the files of a corpus.
+/// What each harness defines: it hands the bytes to one reader. libFuzzer calls it with what it makes up, or
+/// with the files of a corpus.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace afterglow {
