@@ -2,6 +2,7 @@
 #include "core/builtin_scenes.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "tests/support/quad.h"
 
 #include <gtest/gtest.h>
 
@@ -170,13 +171,7 @@ TEST(FindViewpoints, NeedsOneWhereAllIsConnected) {
 
 TEST(FindViewpoints, FindsRoomsOnAGroundThatReachesFar) {
     Scene scene = make_builtin_scene("builtin:two_rooms");
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    for (const Vec3& corner : {Vec3(-400, -0.2f, -400), Vec3(-400, -0.2f, 400), Vec3(400, -0.2f, 400), Vec3(400, -0.2f, -400)})
-        scene.positions.push_back(corner);
-    for (const Triangle& t : {Triangle{first, first + 1, first + 2}, Triangle{first, first + 2, first + 3}}) {
-        scene.triangles.push_back(t);
-        scene.material_index.push_back(0);
-    }
+    add_quad(scene, {Vec3(-400, -0.2f, -400), Vec3(-400, -0.2f, 400), Vec3(400, -0.2f, 400), Vec3(400, -0.2f, -400)});
     const Surface surface(scene);
     for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
         bool found = false; // a place in one of the rooms

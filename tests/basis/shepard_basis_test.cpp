@@ -1,6 +1,7 @@
 #include "basis/shepard_basis.h"
 #include "core/builtin_scenes.h"
 #include "core/sampling.h"
+#include "tests/support/quad.h"
 #include "tests/support/shepard_oracle.h"
 #include "tests/support/surface_samples.h"
 
@@ -166,12 +167,7 @@ TEST(ShepardBasis, SeesASheetThatLiesCloserThanItsLift) {
     // between them below the sheet: the line of sight to the first meets the sheet's edge, though
     // walls are looked for two centimetres above open ground.
     Scene scene = make_ground(10.0f);
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    for (const Vec2& corner : {Vec2(0, -1), Vec2(2, -1), Vec2(2, 1), Vec2(0, 1)})
-        scene.positions.push_back(Vec3(corner.x(), 1e-3f, corner.y()));
-    scene.triangles.push_back({first, first + 2, first + 1});
-    scene.triangles.push_back({first, first + 3, first + 2});
-    scene.material_index.resize(scene.triangles.size(), 0);
+    add_quad(scene, {Vec3(0, 1e-3f, -1), Vec3(0, 1e-3f, 1), Vec3(2, 1e-3f, 1), Vec3(2, 1e-3f, -1)});
     const Surface surface(scene);
     PointHierarchy points;
     points.position.resize(3, 2);

@@ -186,6 +186,10 @@ Spotlight spot(const Vec3& position, const Vec3& direction, float angle) {
 
 int main(int argc, char** argv) {
     using namespace afterglow;
+    if (argc > 2 || (argc == 2 && argv[1][0] == '-')) {
+        std::fprintf(stderr, "usage: afterglow_convergence [FOLDER]\n");
+        return 2;
+    }
     const std::string folder = argc > 1 ? argv[1] : AFTERGLOW_CONVERGENCE_FOLDER;
     try {
         std::filesystem::create_directories(folder);

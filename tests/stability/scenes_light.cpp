@@ -1,4 +1,5 @@
 #include "tests/stability/scenes_light.h"
+#include "tests/support/quad.h"
 
 #include <Eigen/Geometry>
 
@@ -6,14 +7,6 @@ namespace afterglow {
 namespace {
 
 using Quad = std::array<Vec3, 4>; // counter-clockwise from the air
-
-void add_quad(Scene& scene, const Quad& corner, std::uint32_t material) {
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    scene.positions.insert(scene.positions.end(), corner.begin(), corner.end());
-    scene.triangles.push_back({first, first + 1, first + 2});
-    scene.triangles.push_back({first, first + 2, first + 3});
-    scene.material_index.insert(scene.material_index.end(), 2, material);
-}
 
 /// The quad origin, origin + u, origin + u + v, origin + v; seen from the side of u x v.
 Quad parallelogram(const Vec3& origin, const Vec3& u, const Vec3& v) {

@@ -1,23 +1,12 @@
 #include "tests/support/surface_samples.h"
 
 #include "core/sampling.h"
+#include "tests/support/quad.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace afterglow {
-namespace {
-
-void add_quad(Scene& scene, const std::array<Vec3, 4>& corner) {
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    scene.positions.insert(scene.positions.end(), corner.begin(), corner.end());
-    scene.triangles.push_back({first, first + 1, first + 2});
-    scene.triangles.push_back({first, first + 2, first + 3});
-    scene.material_index.insert(scene.material_index.end(), 2, 0);
-}
-
-} // namespace
 
 std::vector<SurfacePoint> points_by_area(const Scene& scene, int count, std::uint64_t seed) {
     const auto corner = [&](std::size_t t, int c) {

@@ -1,5 +1,6 @@
 #include "core/builtin_scenes.h"
 #include "core/sampling.h"
+#include "tests/support/quad.h"
 #include "tests/support/small_transfer.h"
 #include "tests/support/surface_samples.h"
 #include "transport/display.h"
@@ -74,13 +75,7 @@ TEST(Display, IsTheBasisTimesTheFieldDottedWithTheNormal) {
 TEST(Display, TakesNoLightFromBelowTheSurfaceUnderANormalMap) {
     // In a slot of 3 cm over the floor, with a normal that leans by 75 degrees towards its mouth.
     Scene scene = make_builtin_scene("builtin:furnace:0.5");
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    for (const Vec3& corner : {Vec3(-1, -0.97f, -1), Vec3(0, -0.97f, -1), Vec3(0, -0.97f, 1), Vec3(-1, -0.97f, 1)})
-        scene.positions.push_back(corner);
-    for (const Triangle& t : {Triangle{first, first + 1, first + 2}, Triangle{first, first + 2, first + 3}}) {
-        scene.triangles.push_back(t);
-        scene.material_index.push_back(0);
-    }
+    add_quad(scene, {Vec3(-1, -0.97f, -1), Vec3(0, -0.97f, -1), Vec3(0, -0.97f, 1), Vec3(-1, -0.97f, 1)});
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, medium_options());
     const Display display(transfer, surface);

@@ -1,6 +1,7 @@
 #include "core/builtin_scenes.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "tests/support/quad.h"
 #include "tests/support/small_transfer.h"
 #include "tests/support/surface_samples.h"
 #include "transport/display.h"
@@ -105,15 +106,11 @@ TEST(Precompute, StaysInSightOfAGivenViewpoint) {
 TEST(Precompute, FindsARoomWhoseFloorReachesFar) {
     // A furnace whose floor is one quad of 800 m, its viewpoint and size found by itself.
     Scene scene = make_builtin_scene("builtin:furnace:0.5");
-    const auto first = static_cast<std::uint32_t>(scene.positions.size());
-    for (const Vec3& corner : {Vec3(-400, -1, -400), Vec3(-400, -1, 400), Vec3(400, -1, 400), Vec3(400, -1, -400)})
-        scene.positions.push_back(corner);
-    std::vector<Triangle> triangles{{first, first + 1, first + 2}, {first, first + 2, first + 3}};
-    for (const Triangle& t : scene.triangles)
-        if (!std::ranges::all_of(t, [&](std::uint32_t v) { return scene.positions[v].y() == -1.0f; }))
-            triangles.push_back(t);
-    ASSERT_EQ(triangles.size(), scene.triangles.size());
-    scene.triangles = triangles;
+    ASSERT_EQ(std::erase_if(scene.triangles, [&](const Triangle& t) {
+                  return std::ranges::all_of(t, [&](std::uint32_t v) { return scene.positions[v].y() == -1.0f; });
+              }), 2u);
+    scene.material_index.resize(scene.triangles.size()); // all of one material
+    add_quad(scene, {Vec3(-400, -1, -400), Vec3(-400, -1, 400), Vec3(400, -1, 400), Vec3(400, -1, -400)});
     scene.viewpoint.reset();
     const Surface surface(scene);
     const TransferOperator transfer = precompute(surface, medium_options());

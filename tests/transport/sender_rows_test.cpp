@@ -1,6 +1,7 @@
 #include "core/builtin_scenes.h"
 #include "core/sampling.h"
 #include "tests/support/gather_oracle.h"
+#include "tests/support/quad.h"
 #include "tests/support/surface_samples.h"
 #include "transport/precompute.h"
 #include "transport/sender_rows.h"
@@ -156,14 +157,8 @@ TEST(SenderRows, KeepTheSidesOfAWallApart) {
         const float left = thickness == 0.0f ? 0.011f : 0.0f;
         const float right = left + thickness;
         Scene scene = make_ground(1.0f);
-        for (const float x : {left, right}) {
-            const auto first = static_cast<std::uint32_t>(scene.positions.size());
-            for (const Vec3& corner : {Vec3(x, 0, -1), Vec3(x, 1, -1), Vec3(x, 1, 1), Vec3(x, 0, 1)})
-                scene.positions.push_back(corner);
-            scene.triangles.push_back({first, first + 1, first + 2});
-            scene.triangles.push_back({first, first + 2, first + 3});
-            scene.material_index.insert(scene.material_index.end(), 2, 0);
-        }
+        for (const float x : {left, right})
+            add_quad(scene, {Vec3(x, 0, -1), Vec3(x, 1, -1), Vec3(x, 1, 1), Vec3(x, 0, 1)});
         const Surface surface(scene);
         constexpr int side = 20, count = side * side;
         PointHierarchy points;
