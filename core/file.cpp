@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
@@ -34,6 +35,12 @@ public:
     Descriptor& operator=(Descriptor&& other) noexcept {
         std::swap(fd_, other.fd_);
         return *this;
+    }
+    /// One more of an open file of this process; none where there is none of that number.
+    static Descriptor copy_of(int number) {
+        Descriptor copy;
+        copy.fd_ = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
+        return copy;
     }
     explicit operator bool() const { return fd_ >= 0; }
     operator int() const { return fd_; }
@@ -104,28 +111,47 @@ private:
     AtEarlyEnd at_early_end_{[this] { remove(); }};
 };
 
+/// Whether a text is that of two numbers with a dash between them.
+bool is_process_and_number(std::string_view text) {
+    const auto is_number = [](std::string_view part) {
+        return !part.empty() && part.find_first_not_of("0123456789") == std::string_view::npos;
+    };
+    const std::size_t dash = text.find('-');
+    return dash != std::string_view::npos && is_number(text.substr(0, dash)) && is_number(text.substr(dash + 1));
+}
+
 /// Removes what processes that were killed have left of a target.
 void remove_left_behind(const std::string& target) {
     const std::string start = std::filesystem::path(target).filename().string() + unfinished_mark;
     std::error_code failure;
     for (const auto& entry : std::filesystem::directory_iterator(folder_of(target), failure)) {
         const std::string name = entry.path().filename().string();
-        if (!name.starts_with(start) || name.find_first_not_of("0123456789-", start.size()) != std::string::npos)
-            continue;
+        if (!name.starts_with(start) || !is_process_and_number(std::string_view(name).substr(start.size()))) continue;
         const Descriptor file(entry.path().string(), O_WRONLY | O_NONBLOCK | O_NOFOLLOW);
         if (file && ::flock(file, LOCK_EX | LOCK_NB) == 0) ::unlink(entry.path().c_str());
     }
 }
 
-/// The file that a path stands for once symbolic links are followed.
-std::string behind_links(const std::string& path) {
-    std::error_code ignored;
-    if (!std::filesystem::is_symlink(path, ignored)) return path;
-    const auto resolved = std::filesystem::weakly_canonical(path, ignored);
-    return ignored ? path : resolved.string();
-}
-
 } // namespace
+
+OutputTarget output_target(const std::string& path) {
+    constexpr int most_links = 40;
+    std::filesystem::path target = path;
+    std::error_code failure;
+    for (int k = 0; k < most_links; ++k) {
+        const std::filesystem::path folder = std::filesystem::weakly_canonical(folder_of(target.string()), failure);
+        const std::string own = "/proc/" + std::to_string(::getpid()) + "/fd", name = target.filename().string();
+        int number = 0;
+        const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+        if (!failure && folder == own && error == std::errc{} && end == name.data() + name.size())
+            return {target.string(), number};
+        if (!std::filesystem::is_symlink(target, failure)) break;
+        const std::filesystem::path next = std::filesystem::read_symlink(target, failure);
+        if (failure) break;
+        target = next.is_absolute() ? next : target.parent_path() / next;
+    }
+    return {target.string(), {}};
+}
 
 void OutputFile::write(std::span<const std::byte> bytes) {
     while (!bytes.empty()) {
@@ -138,13 +164,13 @@ void OutputFile::write(std::span<const std::byte> bytes) {
 }
 
 void write_atomically(const std::string& path, const std::function<void(OutputFile&)>& write) {
-    const std::string target = behind_links(path);
+    const auto [target, descriptor] = output_target(path);
     struct stat status {};
-    if (::stat(target.c_str(), &status) == 0) {
+    if (descriptor || ::stat(target.c_str(), &status) == 0) {
         if (S_ISDIR(status.st_mode)) throw FileError(path, "is a directory; name a file in it");
-        // A device or pipe is written to, never replaced.
-        if (!S_ISREG(status.st_mode)) {
-            Descriptor device(target, O_WRONLY);
+        // A device, a pipe or what this process has open is written to, never replaced.
+        if (descriptor || !S_ISREG(status.st_mode)) {
+            Descriptor device = descriptor ? Descriptor::copy_of(*descriptor) : Descriptor(target, O_WRONLY);
             if (!device) throw FileError(path, "cannot be opened: " + reason());
             OutputFile output(path, device);
             write(output);

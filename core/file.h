@@ -3,12 +3,20 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 
 namespace afterglow {
+
+/// Where what is written under a name goes: symbolic links are followed, also to what is not there yet.
+struct OutputTarget {
+    std::string path;
+    std::optional<int> descriptor; // where the name is that of an open file of this process, as /dev/stdout is
+};
+OutputTarget output_target(const std::string& path);
 
 /// A file that is being written.
 class OutputFile {
@@ -27,7 +35,7 @@ private:
 /// any failure, and where the process ends early, nothing is left behind and a file that was there stays
 /// as it was. Only SIGKILL or a crash of the machine leaves what was written so far, under the name
 /// TARGET.part-PROCESS-NUMBER, and the next to write the target removes it. Throws FileError. A symbolic
-/// link is followed; a device is written to directly.
+/// link is followed; a device, a pipe and what the process has open (/dev/stdout, /dev/fd/3) are written to directly.
 void write_atomically(const std::string& path, const std::function<void(OutputFile&)>& write);
 
 /// Writes a file that is in memory, whole or not at all. Throws FileError.

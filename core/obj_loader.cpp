@@ -2,7 +2,10 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/mtl_text.h"
+#include "core/obj_lines.h"
 #include "core/polygon.h"
+#include "core/text.h"
 #include "core/texture_file.h"
 
 #include <Eigen/Geometry>
@@ -22,9 +25,9 @@
 #include <set>
 #include <span>
 #include <sstream>
-#include <streambuf>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 namespace afterglow {
 namespace {
@@ -32,112 +35,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr float largest_reflectance = 0.999f; // at one, light would bounce forever
-constexpr std::size_t index_digits = 9;       // tinyobjloader reads indices as int
 constexpr std::size_t most_indices = 999'999'999;
-
-// ---- Text
-// -------------------------------------------------------------------------------------------
-
-std::string_view trimmed(std::string_view text) {
-    const auto begin = text.find_first_not_of(" \t\r\n");
-    if (begin == std::string_view::npos) return {};
-    return text.substr(begin, text.find_last_not_of(" \t\r\n") - begin + 1);
-}
-
-/// Hands the mapped file to tinyobjloader line by line. tinyobjloader reads what is no number
-/// ("nan",
-/// "-inf", "1.#IND") as a plausible zero; here it becomes 1e999, hence infinite, and the triangles
-/// that use it can be told. Likewise an index of ten digits or more, which might come out as a
-/// small one, becomes 0, which is no index.
-class LineBuffer : public std::streambuf {
-public:
-    explicit LineBuffer(std::string_view text) : rest_(text) {}
-
-    /// The line that is being read.
-    std::string_view line() const { return line_; }
-
-private:
-    int_type underflow() override {
-        if (rest_.empty()) return traits_type::eof();
-        std::size_t length = 0;
-        while (length < rest_.size() && rest_[length] != '\n' && rest_[length] != '\r')
-            ++length;
-        length += rest_.substr(length, 2) == "\r\n" ? 2 : 1;
-        line_ = rest_.substr(0, length);
-        rest_.remove_prefix(line_.size());
-        std::string_view shown = line_;
-        if (has_odd_number(line_)) {
-            rewritten_ = with_infinities(line_);
-            shown = rewritten_;
-        } else if (has_absurd_index(line_)) {
-            rewritten_ = without_absurd_indices(line_);
-            shown = rewritten_;
-        }
-        char* begin = const_cast<char*>(shown.data()); // the base class reads only
-        setg(begin, begin, begin + shown.size());
-        return traits_type::to_int_type(*begin);
-    }
-
-    static bool is_number_character(char c) {
-        return (c >= '0' && c <= '9') || c == '+' || c == '-' || c == '.' || c == 'e' || c == 'E';
-    }
-    static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
-    /// Where the numbers of a line "v ...", "vn ..." or "vt ..." begin; 0 for other lines.
-    static std::size_t start_of_numbers(std::string_view line) {
-        std::size_t i = 0;
-        while (i < line.size() && is_space(line[i]))
-            ++i;
-        if (i == line.size() || line[i] != 'v') return 0;
-        ++i;
-        if (i < line.size() && (line[i] == 'n' || line[i] == 't')) ++i;
-        return i < line.size() && is_space(line[i]) ? i : 0;
-    }
-    static bool has_odd_number(std::string_view line) {
-        const std::size_t start = start_of_numbers(line);
-        if (start == 0) return false;
-        return !std::all_of(line.begin() + static_cast<std::ptrdiff_t>(start), line.end(),
-                            [](char c) { return is_number_character(c) || is_space(c); });
-    }
-    static std::string with_infinities(std::string_view line) {
-        std::size_t i = start_of_numbers(line);
-        std::string result(line.substr(0, i));
-        while (i < line.size()) {
-            const std::size_t begin = i;
-            while (i < line.size() && !is_space(line[i]))
-                ++i;
-            const std::string_view token = line.substr(begin, i - begin);
-            const bool is_number = std::all_of(token.begin(), token.end(), is_number_character);
-            result += is_number ? token : std::string_view("1e999");
-            if (i < line.size()) result += line[i++];
-        }
-        return result;
-    }
-
-    static bool is_digit(char c) { return c >= '0' && c <= '9'; }
-    static bool has_absurd_index(std::string_view line) {
-        const std::size_t start = line.find_first_not_of(" \t");
-        if (start == std::string_view::npos || line[start] != 'f') return false;
-        std::size_t run = 0;
-        for (const char c : line)
-            if ((run = is_digit(c) ? run + 1 : 0) > index_digits) return true;
-        return false;
-    }
-    static std::string without_absurd_indices(std::string_view line) {
-        std::string result;
-        for (std::size_t i = 0; i < line.size();) {
-            std::size_t end = i;
-            while (end < line.size() && is_digit(line[end]))
-                ++end;
-            if (end == i) ++end; // a single character that is no digit
-            result += end - i > index_digits ? "0" : line.substr(i, end - i);
-            i = end;
-        }
-        return result;
-    }
-
-    std::string_view rest_, line_;
-    std::string rewritten_;
-};
 
 // ---- Materials and textures
 // -------------------------------------------------------------------------
@@ -146,6 +44,8 @@ struct MaterialSource {
     Material material;
     std::string texture_file; // path, empty where there is none
     NormalSource normals;
+    Vec2 uv_scale = Vec2::Ones(), uv_offset = Vec2::Zero(); // of texture coordinates
+    bool moves_texture() const { return uv_scale != Vec2::Ones() || uv_offset != Vec2::Zero(); }
 };
 
 /// Names in OBJ and MTL files may be written on another system.
@@ -175,28 +75,10 @@ bool is_file(const fs::path& path) {
     return fs::is_regular_file(path, ignored);
 }
 
-constexpr char blank_in_name = '\x1f';
-
-/// An MTL file, with that for blanks in names of materials, which some versions of tinyobjloader end there.
-std::string with_names_in_one_word(std::istream& file) {
-    constexpr std::string_view keyword = "newmtl";
-    std::string text(std::istreambuf_iterator<char>(file), {});
-    for (std::size_t begin = 0, end; begin < text.size(); begin = end + 1) {
-        end = std::min(text.find_first_of("\r\n", begin), text.size());
-        const std::string_view line = trimmed(std::string_view(text).substr(begin, end - begin));
-        if (!line.starts_with(keyword)) continue;
-        const std::string_view rest = line.substr(keyword.size()), name = trimmed(rest);
-        if (name.size() == rest.size()) continue; // another word
-        char* first = text.data() + (name.data() - text.data());
-        std::replace(first, first + name.size(), ' ', blank_in_name);
-    }
-    return text;
-}
-
 /// Reads the MTL files that the OBJ file names.
 class MaterialFiles : public tinyobj::MaterialReader {
 public:
-    MaterialFiles(fs::path folder, const LineBuffer& obj, SceneSummary& summary)
+    MaterialFiles(fs::path folder, const ObjLines& obj, SceneSummary& summary)
         : folder_(std::move(folder)), obj_(obj), summary_(summary) {}
 
     bool operator()(const std::string& name, std::vector<tinyobj::material_t>* materials,
@@ -208,7 +90,7 @@ public:
         const fs::path whole = beside(folder_, line), part = beside(folder_, name);
         const fs::path& path = is_file(whole) ? whole : part;
 
-        if (!asked_.insert(path).second) return is_file(path); // it was read, or told of, before
+        if (!asked_.insert(path).second) return false; // it was read, or told of, before
         std::ifstream file(path);
         if (!is_file(path) || !file) {
             summary_.missing_files.push_back(path.string());
@@ -216,15 +98,16 @@ public:
         }
         note_if_outside(path.string(), folder_, summary_);
         const std::size_t known = materials->size();
-        std::istringstream text(with_names_in_one_word(file));
+        const std::string read_text{std::istreambuf_iterator<char>(file), {}};
+        std::istringstream text(mtl_for_tinyobj(read_text));
         tinyobj::LoadMtl(index, materials, &text, warnings, errors);
         for (std::size_t i = known; i < materials->size(); ++i) {
             tinyobj::material_t& read = (*materials)[i];
-            std::replace(read.name.begin(), read.name.end(), blank_in_name, ' ');
+            std::replace(read.name.begin(), read.name.end(), mtl_blank_in_name, ' ');
             index->emplace(read.name, static_cast<int>(i));
             sources.push_back(convert(read, path.parent_path()));
         }
-        return true;
+        return false; // what "mtllib a.mtl b.mtl" names next is read as well
     }
 
     std::vector<MaterialSource> sources; // in tinyobjloader's order
@@ -243,11 +126,16 @@ private:
             const float multiplier = std::isfinite(given) ? std::clamp(given, -1e6f, 1e6f) : 1.0f;
             source.normals = {beside(folder, from.bump_texname).string(), true, multiplier};
         }
+        const tinyobj::texture_option_t& options = !source.texture_file.empty() ? from.diffuse_texopt
+                                                   : source.normals.may_be_heights ? from.bump_texopt
+                                                                                 : from.normal_texopt;
+        source.uv_scale = {options.scale[0], options.scale[1]};
+        source.uv_offset = {options.origin_offset[0], options.origin_offset[1]};
         return source;
     }
 
     fs::path folder_;
-    const LineBuffer& obj_;
+    const ObjLines& obj_;
     SceneSummary& summary_;
     std::set<fs::path> asked_;
 };
@@ -340,7 +228,7 @@ tinyobj::callback_t callbacks() {
 
 RawObj parse(const std::string& path, SceneSummary& summary) {
     const MappedFile file(path);
-    LineBuffer lines({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
+    ObjLines lines({reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size()});
     std::istream stream(&lines);
     stream.exceptions(std::ios::badbit); // errors of our own calls come through
     MaterialFiles material_files(fs::path(path).parent_path(), lines, summary);
@@ -462,7 +350,28 @@ private:
         }
         if (!raw_.texture_coordinates.empty())
             scene_.texture_indices.push_back(
-                complete({c[0].texture, c[1].texture, c[2].texture}, texture_usable_));
+                moved(complete({c[0].texture, c[1].texture, c[2].texture}, texture_usable_), material));
+    }
+
+    /// Texture coordinates as a material scales and shifts them (-s, -o), which are new ones.
+    Triangle moved(const Triangle& t, int material) {
+        if (t[0] == no_index || material < 0 || !raw_.materials[static_cast<std::size_t>(material)].moves_texture())
+            return t;
+        const MaterialSource& source = raw_.materials[static_cast<std::size_t>(material)];
+        Triangle result;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto [entry, is_new] = moved_.try_emplace({t[k], material}, no_index);
+            if (is_new) {
+                const Vec2 uv = source.uv_scale.cwiseProduct(raw_.texture_coordinates[t[k]]) + source.uv_offset;
+                if (is_reachable(uv)) {
+                    entry->second = static_cast<std::uint32_t>(raw_.texture_coordinates.size());
+                    raw_.texture_coordinates.push_back(uv);
+                }
+            }
+            result[k] = entry->second;
+        }
+        const bool whole = std::ranges::find(result, no_index) == result.end();
+        return whole ? result : Triangle{no_index, no_index, no_index};
     }
 
     static bool is_bad(std::uint32_t index, const std::vector<bool>& is_usable) {
@@ -532,6 +441,7 @@ private:
     Scene& scene_;
     std::vector<bool> normal_usable_, texture_usable_;
     std::vector<std::uint32_t> new_material_;
+    std::map<std::pair<std::uint32_t, int>, std::uint32_t> moved_; // texture coordinate and material
     std::map<std::string, std::uint32_t> texture_by_file_;
     std::map<NormalSource, std::uint32_t> normal_map_by_source_;
     std::vector<Vec3> polygon_;

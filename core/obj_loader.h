@@ -7,7 +7,8 @@
 namespace afterglow {
 
 /// Loads a Wavefront OBJ file with its MTL files, map_Kd textures and normal maps; lines, points and
-/// free-form surfaces are ignored. A normal map is what `norm` names, or else `map_Bump` or `bump`; the
+/// free-form surfaces are ignored. Reflectance is Kd times map_Kd, each white where the other stands alone, with
+/// texture coordinates times -s plus -o. A normal map is what `norm` names, or else `map_Bump` or `bump`; the
 /// latter two are heights, times -bm, unless they look like normals (see normal_map.h). Pictures are
 /// PNG, JPEG, TGA or BMP; of each 8 bits a channel are read.
 /// Faults that leave a usable scene are mended and told in `summary`:

@@ -1,6 +1,7 @@
 #include "transport/cli_options.h"
 
 #include "core/error.h"
+#include "core/text.h"
 
 #include <CLI/CLI.hpp>
 
@@ -46,8 +47,7 @@ Eigen::VectorXf parse_numbers(const std::string& option, const std::string& text
     std::string_view rest = text;
     for (int i = 0; i < count; ++i) {
         const auto comma = rest.find(',');
-        if ((comma == std::string_view::npos) != (i + 1 == count)
-            || !parse(rest.substr(0, comma), values[i]) || !std::isfinite(values[i]))
+        if ((comma == std::string_view::npos) != (i + 1 == count) || !parse_finite(rest.substr(0, comma), values[i]))
             throw UsageError(option + " must be " + std::to_string(count)
                              + " finite numbers with commas between them, not '" + printable(text) + "'");
         if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);

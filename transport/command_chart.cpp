@@ -262,6 +262,7 @@ void add_chart_command(CLI::App& app) {
                     "Some of them alone, or a value of one (target=0.1): spacing, target, path, paper, dense, flat, "
                     "rays, receiver_levels, sender_levels, threshold, bounces")
         ->delimiter(',')
+        ->allow_extra_args(false)
         ->type_name("SWEEP,...");
     add_number(*sub, "--max-time", command->max_time,
                "Limit of each search for a spacing in seconds: the sweep target then has the best that was reached");

@@ -8,8 +8,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace afterglow {
@@ -22,7 +25,7 @@ struct CompareCommand {
 
 struct Samples {
     Eigen::Array3Xf x, y;
-    std::string reference_error; // as the reference states it, or empty
+    std::optional<double> reference_error; // as the reference states it
 };
 
 /// The pixels at which at least one of the two is not black.
@@ -46,7 +49,12 @@ Samples covered_pixels(const CompareCommand& command) {
     samples.x.conservativeResize(3, covered);
     samples.y.conservativeResize(3, covered);
     const auto stated = b.attributes.find("afterglow.relative_standard_error");
-    if (stated != b.attributes.end()) samples.reference_error = stated->second;
+    if (stated == b.attributes.end()) return samples;
+    double error = 0.0;
+    const std::string& text = stated->second;
+    if (std::from_chars(text.data(), text.data() + text.size(), error).ec != std::errc{} || !std::isfinite(error))
+        throw FileError(command.reference, "has an attribute afterglow.relative_standard_error that is no number");
+    samples.reference_error = error;
     return samples;
 }
 
@@ -66,8 +74,7 @@ void run(const CompareCommand& command) {
                                  {"rel_rmse", m.rel_rmse}, {"rel_l1", m.rel_l1},
                                  {"bias", m.bias},         {"median", m.median},
                                  {"p95", m.p95},           {"p99", m.p99}};
-        if (!samples.reference_error.empty())
-            result["reference_standard_error"] = std::stod(samples.reference_error);
+        if (samples.reference_error) result["reference_standard_error"] = *samples.reference_error;
         std::printf("%s\n", result.dump().c_str());
         return;
     }
@@ -77,8 +84,7 @@ void run(const CompareCommand& command) {
                 100.0 * m.p95, 100.0 * m.p99);
     std::printf("samples %lld, reference mean %.6g", static_cast<long long>(m.samples),
                 m.reference_mean);
-    if (!samples.reference_error.empty())
-        std::printf(", its own standard error %.3f %%", 100.0 * std::stod(samples.reference_error));
+    if (samples.reference_error) std::printf(", its own standard error %.3f %%", 100.0 * *samples.reference_error);
     std::printf("\n");
 }
 

@@ -173,7 +173,7 @@ Json seconds_json(const PrecomputeReport& report, const OuterSeconds& outer) {
 }
 
 void print_results(const PrecomputeCommand& command, const TransferOperator& transfer,
-                   const PrecomputeReport& report, const LinkCounts& links,
+                   const PrecomputeReport& report, const LinkCounts& links, std::uint64_t bytes,
                    const Verification& verified, const OuterSeconds& outer) {
     const auto say = [](const char* format, auto... values) {
         std::fprintf(stderr, format, values...);
@@ -187,7 +187,7 @@ void print_results(const PrecomputeCommand& command, const TransferOperator& tra
             l < transfer.sender_levels ? ", senders too" : "");
     }
     say("%s: %.1f MB, %.3g links of %.3g, %.3g rays, %s\n", command.output.c_str(),
-        static_cast<double>(std::filesystem::file_size(command.output)) * 1e-6,
+        static_cast<double>(bytes) * 1e-6,
         static_cast<double>(links.all),
         static_cast<double>(report.links.links_before),
         static_cast<double>(report.links.rays + report.points_rays),
@@ -265,6 +265,7 @@ void open_checkpoint(const PrecomputeCommand& command, TransferProvenance asked,
 void run(PrecomputeCommand& command) {
     check_outputs({command.output, command.report, command.checkpoint}, {command.scene});
     check_scene_name(command.scene);
+    check_scene_name(stored_scene_path(command.output, command.scene));
     const ThreadLimit limit(command.run.threads);
     OuterSeconds outer;
     const auto start = Clock::now();
@@ -309,7 +310,7 @@ void run(PrecomputeCommand& command) {
     const Json statistics = statistics_json(transfer, report, links, verified, tuning);
     TransferProvenance provenance = asked;
     provenance.statistics = statistics.dump();
-    save_transfer(command.output, transfer, provenance);
+    const std::uint64_t bytes = save_transfer(command.output, transfer, provenance);
     advice.reset();
     if (checkpoint) checkpoint->remove();
     outer.write = lap(time);
@@ -323,12 +324,12 @@ void run(PrecomputeCommand& command) {
                            {"threads", thread_count()},
                            {"options", options},
                            {"statistics", statistics},
-                           {"bytes", std::filesystem::file_size(command.output)},
+                           {"bytes", bytes},
                            {"seconds", seconds_json(report, outer)}};
         write_file(command.report, json.dump(1) + "\n");
     }
     if (command.run.quiet) return;
-    print_results(command, transfer, report, links, verified, outer);
+    print_results(command, transfer, report, links, bytes, verified, outer);
     if (command.tuned) print_tuning(command, tuning);
 }
 

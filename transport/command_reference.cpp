@@ -121,6 +121,9 @@ void run(ReferenceCommand& command, bool has_camera) {
         std::fprintf(stderr, "relative standard error %.3g %% (%.3g paths, %.3g rays, %s)\n",
                      100.0 * achieved.relative_error, static_cast<double>(achieved.samples),
                      static_cast<double>(achieved.rays), duration_text(achieved.seconds).c_str());
+    if (command.target_error > 0.0 && achieved.relative_error > command.target_error)
+        std::fprintf(stderr, "afterglow: warning: the target error of %.3g %% was not reached: so many paths are the most\n",
+                     100.0 * command.target_error);
 }
 
 } // namespace

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/text.h"
 
 #include <array>
 #include <charconv>
@@ -13,25 +14,12 @@
 namespace afterglow {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-    const auto begin = text.find_first_not_of(" \t\r");
-    if (begin == std::string_view::npos) return {};
-    return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
-bool parse_number(std::string_view text, float& value) {
-    text = trimmed(text);
-    if (text.starts_with('+')) text.remove_prefix(1);
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
-}
-
 /// A first line none of whose fields is a number.
 bool is_header(std::string_view line) {
     for (;;) {
         const auto comma = line.find(',');
         float value = 0.0f;
-        if (parse_number(line.substr(0, comma), value)) return false;
+        if (parse_finite(trimmed(line.substr(0, comma)), value)) return false;
         if (comma == std::string_view::npos) return true;
         line.remove_prefix(comma + 1);
     }
@@ -46,7 +34,7 @@ void read_rows(const std::string& path, const char* names, const Use& use) {
     bool first = true;
     for (std::size_t number = 1; std::getline(file, text); ++number) {
         std::string_view rest = trimmed(text);
-        if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3); // a byte order mark
+        if (rest.starts_with(byte_order_mark)) rest.remove_prefix(byte_order_mark.size());
         if (rest.empty()) continue;
         if (std::exchange(first, false) && is_header(rest)) continue;
         const std::string where = "line " + std::to_string(number) + ": ";
@@ -56,7 +44,7 @@ void read_rows(const std::string& path, const char* names, const Use& use) {
             if ((comma == std::string_view::npos) != (c + 1 == columns))
                 throw FileError(path, where + "must hold " + std::to_string(columns) + " numbers "
                                           + names);
-            if (!parse_number(rest.substr(0, comma), row[c]))
+            if (!parse_finite(trimmed(rest.substr(0, comma)), row[c]))
                 throw FileError(path, where + "'" + printable(std::string(trimmed(rest.substr(0, comma))))
                                           + "' is not a finite number");
             if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);

@@ -200,13 +200,16 @@ std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const s
                                                  / static_cast<double>(std::clamp<std::size_t>(small_waiting_, 1, which.size() + 1)));
     WantedLists wanted = look(pixels, which, small_share, patch);
 
-    std::vector<Group> large = group(wanted.large);
-    large = chosen(large, large.size());
-    if (patches() + large.size() > options_.most_patches && patches() > 0) {
+    // Of which one view, with a large and a small one at each pixel, never needs more.
+    const std::size_t limit = std::max(options_.most_patches, 2 * patch.size());
+    const auto anew = [&] {
         forget_all();
         return find(pixels, most_new, patch);
-    }
-    make(pixels, large, false);
+    };
+    std::vector<Group> large = group(wanted.large);
+    large = chosen(large, large.size());
+    if (patches() + large.size() > limit) return anew();
+    make(pixels, large);
     wanted.append(look(pixels, pixels_of(large), small_share, patch));
 
     const std::vector<Group> untested = group(wanted.untested);
@@ -216,11 +219,10 @@ std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const s
     wanted.append(look(pixels, pixels_of(to_test), small_share, patch));
 
     const std::vector<Group> small = group(wanted.small);
-    const std::size_t room =
-        std::max(options_.most_patches, 2 * patch.size()) - std::min(patches(), options_.most_patches);
-    const std::size_t made = std::min({small.size(), most_new - tested * places_compared, room});
+    const std::size_t made = std::min(small.size(), most_new - tested * places_compared);
+    if (patches() + made > limit) return anew();
     const std::vector<Group> to_make = chosen(small, made);
-    make(pixels, to_make, true);
+    make(pixels, to_make);
     const std::vector<std::uint32_t> done = pixels_of(to_make);
     look(pixels, done, 0.0, patch);
 
@@ -234,7 +236,7 @@ std::size_t DisplayPatches::serve(const PixelSurfaces& pixels, std::span<const s
     return waiting_.size();
 }
 
-void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> groups, bool are_small) {
+void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> groups) {
     struct Rows {
         std::vector<BasisEntry> entries;
         std::vector<std::size_t> end;
@@ -259,7 +261,7 @@ void DisplayPatches::make(const PixelSurfaces& pixels, std::span<const Group> gr
             const PixelSurfaces::Float4& x = pixels.position[w.pixel];
             insert(w.key, static_cast<std::uint32_t>(patches()));
             begin_.push_back(static_cast<std::uint32_t>(first + end));
-            patch_.push_back({{x[0], x[1], x[2]}, are_small ? std::numeric_limits<float>::infinity() : 0.0f});
+            patch_.push_back({{x[0], x[1], x[2]}, 0.0f});
         }
     }
 }

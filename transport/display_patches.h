@@ -42,7 +42,8 @@ public:
         float patch_pixels = 8.0f; // the longest edge of a cube, in pixels at the pixel's distance
         float small_pixels = 0.5f; // the same of the small patches
         float tolerance = 0.1f;
-        std::size_t most_patches = 2'000'000; // ~140 bytes each; beyond that, all are forgotten
+        /// ~140 bytes each; beyond that, and two a pixel, all are forgotten.
+        std::size_t most_patches = 2'000'000;
     };
     static constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
@@ -76,7 +77,8 @@ public:
 private:
     struct Patch {
         std::array<float, 3> place = {}; // where its factors were found [world]
-        /// So far from it factors are known to be alike [world^2]; below zero where it is delicate.
+        /// So far from it factors are known to be alike [world^2]; below zero where it is delicate. Small ones come
+        /// untested: they may be large ones of a closer camera.
         float alike2 = 0.0f;
         bool is_delicate() const { return alike2 < 0.0f; }
         float distance2(const PixelSurfaces::Float4& x) const {
@@ -138,7 +140,7 @@ private:
     /// close is made together and lies close in memory.
     static std::vector<Group> chosen(std::span<const Group> groups, std::size_t count);
     /// A patch for each group, from the first of its pixels.
-    void make(const PixelSurfaces& pixels, std::span<const Group> groups, bool are_small);
+    void make(const PixelSurfaces& pixels, std::span<const Group> groups);
     void test(const PixelSurfaces& pixels, std::span<const Group> groups);
     /// How far factors are alike, now that these pixels show it: see Patch.
     float compared(const PixelSurfaces& pixels, const Group& group) const;

@@ -1,6 +1,8 @@
 #include "transport/provenance.h"
 
 #include "core/error.h"
+#include "core/file.h"
+#include "core/text.h"
 
 #include <nlohmann/json.hpp>
 
@@ -22,8 +24,9 @@ std::string vector_text(const Eigen::Ref<const Vec3>& v) {
 void check_output(const std::string& path) {
     std::error_code ignored;
     if (fs::is_directory(path, ignored)) throw FileError(path, "is a directory; name a file in it");
-    if (fs::is_other(path, ignored)) return; // a device has no file beside it
-    const fs::path folder = fs::path(path).parent_path();
+    const OutputTarget target = output_target(path);
+    if (target.descriptor || fs::is_other(path, ignored)) return; // a device has no file beside it
+    const fs::path folder = fs::path(target.path).parent_path();
     const std::string name = folder.empty() ? "." : folder.string();
     if (!fs::is_directory(name, ignored)) throw FileError(path, "cannot be created: there is no folder " + name);
     if (::access(name.c_str(), W_OK) != 0)
@@ -69,8 +72,10 @@ void check_scene_name(const std::string& scene) {
     try {
         (void)nlohmann::json(scene).dump();
     } catch (const nlohmann::json::exception&) {
-        throw UsageError("the scene's name is not UTF-8, which results cannot hold; rename it");
+        throw UsageError("the scene's path is not UTF-8, which results cannot hold; rename it");
     }
+    if (!is_line_of_text(scene))
+        throw UsageError("the scene's path has a line end or another control character, or over 4096 bytes, which results cannot hold; rename it");
 }
 
 } // namespace afterglow

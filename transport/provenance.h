@@ -19,7 +19,8 @@ std::map<std::string, std::string> light_attributes(const Spotlight& light);
 /// one file, or where the first output has no name. Other empty names, and devices, are nobody's.
 void check_outputs(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs);
 
-/// Throws UsageError where a scene's name is not UTF-8, which neither transfer files nor reports can hold.
+/// Throws UsageError where a scene's name is not what transfer files and reports can hold: one line of UTF-8 of at
+/// most 4096 bytes.
 void check_scene_name(const std::string& scene);
 
 } // namespace afterglow

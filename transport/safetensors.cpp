@@ -322,15 +322,20 @@ bool fits(const TensorShape& shape, const TensorShape& expected) {
 
 } // namespace
 
-void write_safetensors(const std::string& path, std::span<const Tensor> tensors,
-                       const TensorMetadata& metadata) {
+std::uint64_t write_safetensors(const std::string& path, std::span<const Tensor> tensors,
+                                const TensorMetadata& metadata) {
     assert(writable(tensors, metadata));
     const std::vector<Tensor> padded = with_padding(tensors);
     const std::string header = make_header(path, padded, metadata);
+    std::uint64_t bytes = header.size();
     write_atomically(path, [&](OutputFile& file) {
         file.write(std::as_bytes(std::span(header)));
-        for (const Tensor& tensor : padded) file.write(tensor.bytes);
+        for (const Tensor& tensor : padded) {
+            file.write(tensor.bytes);
+            bytes += tensor.bytes.size();
+        }
     });
+    return bytes;
 }
 
 SafetensorsFile::SafetensorsFile(const std::string& path)

@@ -62,8 +62,8 @@ using TensorMetadata = std::map<std::string, std::string>;
 /// Writes the tensors in the order given, each at a multiple of 64 bytes, and the metadata; the
 /// same arguments give the same bytes. The file appears whole or not at all. Names must differ and
 /// must not start with "padding." or "__"; metadata keys must not be those of the checksums
-/// (asserted). Throws FileError where the file cannot be written or a string is not UTF-8.
-void write_safetensors(const std::string& path, std::span<const Tensor> tensors,
+/// (asserted). Returns the file's bytes. Throws FileError where the file cannot be written or a string is not UTF-8.
+std::uint64_t write_safetensors(const std::string& path, std::span<const Tensor> tensors,
                        const TensorMetadata& metadata);
 
 /// A file of write_safetensors(), mapped and checked: once constructed, every tensor lies inside

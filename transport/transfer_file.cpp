@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/obj_loader.h"
 #include "core/parallel.h"
+#include "core/text.h"
 #include "transport/safetensors.h"
 #include "transport/sender_rows.h"
 
@@ -38,16 +39,6 @@ std::filesystem::path resolved(const std::filesystem::path& path) {
 /// The folder that a transfer file really lies in: where its relative paths start.
 std::filesystem::path folder_of(const std::string& path) {
     return resolved(path).parent_path();
-}
-
-/// A scene's path relative to the folder of `file`. Only its folder is resolved, as the files that
-/// an OBJ file names are sought beside it, not beside what it may be a link to.
-std::string stored_scene_path(const std::string& file, const std::string& scene) {
-    if (is_builtin_scene(scene)) return scene;
-    const std::filesystem::path name(scene);
-    const auto folder = resolved(name.has_parent_path() ? name.parent_path() : ".");
-    const auto relative = folder.lexically_relative(folder_of(file));
-    return ((relative.empty() ? folder : relative) / name.filename()).lexically_normal().string();
 }
 
 std::string opened_scene_path(const std::string& file, const std::string& stored) {
@@ -318,9 +309,7 @@ private:
     /// Metadata that messages repeat: one short line.
     const std::string& line(const std::string& key) const {
         const std::string& text = file_.metadata(key);
-        const auto control = [](unsigned char c) { return c < 32 || c == 127; };
-        if (text.empty() || text.size() > 4096 || std::any_of(text.begin(), text.end(), control))
-            fail("has metadata '" + key + "' that is no line of text");
+        if (!is_line_of_text(text)) fail("has metadata '" + key + "' that is no line of text");
         return text;
     }
 
@@ -335,9 +324,17 @@ std::span<const Scalar> values_of(const Eigen::Matrix<Scalar, Rows, Columns>& ma
 
 } // namespace
 
-void save_transfer(const std::string& path, const TransferOperator& transfer,
-                   const TransferProvenance& provenance, const std::string& format,
-                   const std::vector<Tensor>& further) {
+std::string stored_scene_path(const std::string& file, const std::string& scene) {
+    if (is_builtin_scene(scene)) return scene;
+    const std::filesystem::path name(scene);
+    const auto folder = resolved(name.has_parent_path() ? name.parent_path() : ".");
+    const auto relative = folder.lexically_relative(folder_of(file));
+    return ((relative.empty() ? folder : relative) / name.filename()).lexically_normal().string();
+}
+
+std::uint64_t save_transfer(const std::string& path, const TransferOperator& transfer,
+                            const TransferProvenance& provenance, const std::string& format,
+                            const std::vector<Tensor>& further) {
     const PointHierarchy& points = transfer.points;
     const std::uint64_t count = points.size(), levels = points.spacing.size();
     std::vector<Tensor> tensors;
@@ -377,16 +374,16 @@ void save_transfer(const std::string& path, const TransferOperator& transfer,
     }
 
     tensors.insert(tensors.end(), further.begin(), further.end());
-    write_safetensors(path, tensors,
-                      {{"format", format},
-                       {"format_version", format_version},
-                       {"version", provenance.version},
-                       {"scene", stored_scene_path(path, provenance.scene)},
-                       {"scene_hash", provenance.scene_hash},
-                       {"seed", std::to_string(provenance.seed)},
-                       {"model", model_text(transfer)},
-                       {"options", provenance.options},
-                       {"statistics", provenance.statistics}});
+    return write_safetensors(path, tensors,
+                             {{"format", format},
+                              {"format_version", format_version},
+                              {"version", provenance.version},
+                              {"scene", stored_scene_path(path, provenance.scene)},
+                              {"scene_hash", provenance.scene_hash},
+                              {"seed", std::to_string(provenance.seed)},
+                              {"model", model_text(transfer)},
+                              {"options", provenance.options},
+                              {"statistics", provenance.statistics}});
 }
 
 TransferFile load_transfer(const std::string& path, const std::string& format) {

@@ -30,11 +30,15 @@ struct TransferFile {
 inline constexpr const char* transfer_format = "afterglow transfer"; // of operators that are finished
 
 /// Writes the file that docs/transfer-format.md describes; it appears whole or not at all. The
-/// scene's path is kept relative to the file's folder. Throws FileError. A file of another `format` may hold
-/// further tensors.
-void save_transfer(const std::string& path, const TransferOperator& transfer,
-                   const TransferProvenance& provenance, const std::string& format = transfer_format,
-                   const std::vector<Tensor>& further = {});
+/// scene's path is kept relative to the file's folder. Returns the file's bytes. Throws FileError. A file of
+/// another `format` may hold further tensors.
+std::uint64_t save_transfer(const std::string& path, const TransferOperator& transfer,
+                            const TransferProvenance& provenance, const std::string& format = transfer_format,
+                            const std::vector<Tensor>& further = {});
+
+/// What a file keeps of a scene's path: relative to the file's folder. Only the scene's own folder is resolved, as
+/// the files that an OBJ file names are sought beside it, not beside what it may be a link to.
+std::string stored_scene_path(const std::string& file, const std::string& scene);
 
 /// Maps a file and checks everything that the computation relies on: sizes, offsets, sorted indices
 /// in range, finite values, unit normals. Takes one pass over the file. Throws FileError, also where the

@@ -46,7 +46,9 @@ void aim(Spotlight& light, const Vec3& at) {
 void widen(Spotlight& light, float factor) {
     Spotlight moved = light;
     moved.outer_angle = std::clamp(light.outer_angle * factor, 0.5f, 180.0f);
-    moved.inner_angle = light.inner_angle * moved.outer_angle / light.outer_angle;
+    moved.inner_angle = light.inner_angle == light.outer_angle
+                            ? moved.outer_angle // stays hard, whatever is rounded
+                            : std::min(light.inner_angle * moved.outer_angle / light.outer_angle, moved.outer_angle);
     accept(light, moved);
 }
 

@@ -122,7 +122,7 @@ void Renderer::draw_direct() {
     if (shadow_map_is_old_) timings_.shadow_map = measured([&] { shadow_map_.draw(mesh_, light_); });
     if (direct_is_old_)
         timings_.direct = measured([&] {
-            shadow_map_.shade(mesh_, geometry_, targets_->direct_framebuffer, targets_->width, targets_->height);
+            shadow_map_.shade(mesh_, light_, geometry_, targets_->direct_framebuffer, targets_->width, targets_->height);
         });
     shadow_map_is_old_ = direct_is_old_ = false;
 }

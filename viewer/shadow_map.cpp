@@ -131,7 +131,6 @@ void ShadowMap::prepare(int layers) {
 }
 
 void ShadowMap::draw(const SceneMesh& mesh, const Spotlight& light) {
-    light_ = light;
     faces_.clear();
     float half_angle = 45.0f;
     if (light.outer_angle <= widest_single) {
@@ -174,8 +173,8 @@ void ShadowMap::draw(const SceneMesh& mesh, const Spotlight& light) {
     }
 }
 
-void ShadowMap::shade(const SceneMesh& mesh, const GeometryBuffer& pixels, GLuint framebuffer,
-                      int width, int height) {
+void ShadowMap::shade(const SceneMesh& mesh, const Spotlight& light, const GeometryBuffer& pixels,
+                      GLuint framebuffer, int width, int height) {
     gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     gl_.Viewport(0, 0, width, height);
     const GlProgram& p = shade_program_;
@@ -200,14 +199,14 @@ void ShadowMap::shade(const SceneMesh& mesh, const GeometryBuffer& pixels, GLuin
         set("down", faces_[k].down);
     }
     p.set("half_width", half_width_);
-    p.set("light_position", light_.position);
-    p.set("light_direction", light_.direction);
-    p.set("intensity", light_.intensity);
-    p.set("cos_outer", cos_degrees(light_.outer_angle));
+    p.set("light_position", light.position);
+    p.set("light_direction", light.direction);
+    p.set("intensity", light.intensity);
+    p.set("cos_outer", cos_degrees(light.outer_angle));
     // As Spotlight::falloff.
-    p.set("falloff_width", light_.inner_angle == light_.outer_angle
+    p.set("falloff_width", light.inner_angle == light.outer_angle
                                ? 0.0f
-                               : std::max(0.001f, cos_degrees(light_.inner_angle) - cos_degrees(light_.outer_angle)));
+                               : std::max(0.001f, cos_degrees(light.inner_angle) - cos_degrees(light.outer_angle)));
     gl_.BindVertexArray(vertex_array_);
     gl_.DrawArrays(GL_TRIANGLES, 0, 3);
 }

@@ -19,14 +19,14 @@ public:
     /// Draws what the light sees; to be called when it has moved.
     void draw(const SceneMesh& mesh, const Spotlight& light);
 
-    /// Irradiance [W/m^2] by the light of the last draw() at the pixels of a geometry buffer, RGBA32F,
-    /// into the whole of `framebuffer`.
+    /// Irradiance [W/m^2] by a light at the pixels of a geometry buffer, RGBA32F, into the whole of
+    /// `framebuffer`. The light may differ from that of the last draw() in intensity and inner angle.
     ///
     /// A pixel compares four texels around it, each with the distance at which the light's ray
     /// through the texel's centre meets the plane of the pixel's triangle, and blends what they say: no
     /// bias that grows with the slope is needed, and shadows begin where things touch.
-    void shade(const SceneMesh& mesh, const GeometryBuffer& pixels, GLuint framebuffer, int width,
-               int height);
+    void shade(const SceneMesh& mesh, const Spotlight& light, const GeometryBuffer& pixels, GLuint framebuffer,
+               int width, int height);
 
 private:
     struct Face {
@@ -39,7 +39,6 @@ private:
     int layers_ = 0; // of the textures
     std::vector<Face> faces_;
     float half_width_ = 1.0f; // of the pictures, at distance one
-    Spotlight light_;
 
     void prepare(int layers);
 };

@@ -19,7 +19,7 @@ namespace afterglow {
 namespace {
 
 constexpr double most_patch_seconds = 0.03; // of a picture, so that it stays smooth
-constexpr std::size_t fewest_new = 200;
+constexpr std::size_t fewest_new = 200, most_at_once = 1'000'000;
 constexpr std::size_t history = 200;
 constexpr float grab_radius = 14.0f; // pixels about the light's mark
 
@@ -54,9 +54,8 @@ void ViewerApp::attempt(const Work& work) {
 
 void ViewerApp::open(const std::string& path) {
     if (path.ends_with(".obj") || path.ends_with(".OBJ")) {
-        const std::string file = std::filesystem::path(path).stem().string() + ".afterglow";
         precompute_ = std::make_unique<PrecomputeTask>(
-            path, (std::filesystem::path(options_.folder) / file).string());
+            path, free_name(std::filesystem::path(path).stem().string(), ".afterglow", false));
         return;
     }
     attempt([&] { // the window stays with what it has
@@ -78,7 +77,10 @@ void ViewerApp::set_light(const Spotlight& light) {
 
 void ViewerApp::connect_events() {
     window_.events.key = [this](int key, bool, bool) {
-        if (session_ && !ImGui::GetIO().WantTextInput) on_key(key);
+        if (key == GLFW_KEY_ESCAPE)
+            window_.close();
+        else if (session_ && !ImGui::GetIO().WantTextInput)
+            on_key(key);
     };
     window_.events.button = [this](int button, bool pressed, bool shift, bool control) {
         if (session_ && (!pressed || !ImGui::GetIO().WantCaptureMouse)) on_button(button, pressed, shift, control);
@@ -129,7 +131,6 @@ void ViewerApp::on_key(int key) {
         break;
     case GLFW_KEY_TAB: panels_ = !panels_; break;
     case GLFW_KEY_F12: screenshot_wanted_ = true; break;
-    case GLFW_KEY_ESCAPE: window_.close(); break;
     default: break;
     }
 }
@@ -142,6 +143,7 @@ std::optional<SurfacePoint> ViewerApp::surface_under(const Vec2& pixel) {
 }
 
 bool ViewerApp::grabs_light(const Vec2& pixel) const {
+    if (!panels_) return false; // nor is its mark drawn
     const std::optional<Vec2> mark = project(session_->camera, session_->light.position);
     return mark && (*mark - pixel).norm() < grab_radius;
 }
@@ -223,7 +225,7 @@ void ViewerApp::toggle_recording() {
         return;
     }
     recording_since_.reset();
-    const std::string file = numbered("path", ".json");
+    const std::string file = free_name("path", ".json");
     write_frame_path(file, path_);
     message_ = "wrote " + file + ", " + std::to_string(path_.size()) + " frames; space plays it";
 }
@@ -245,19 +247,23 @@ void ViewerApp::play() {
     if (time >= path_.back().time) playing_since_.reset();
 }
 
-std::string ViewerApp::numbered(const std::string& kind, const std::string& ending) const {
+std::string ViewerApp::free_name(const std::string& stem, const std::string& ending, bool always_numbered) const {
     for (int k = 0;; ++k) {
-        const std::string name =
-            (std::filesystem::path(options_.folder) / (kind + "_" + std::to_string(k) + ending)).string();
+        std::string file = stem;
+        if (k > 0 || always_numbered) file.append("_").append(std::to_string(k));
+        const std::string name = (std::filesystem::path(options_.folder) / (file + ending)).string();
         if (!std::filesystem::exists(name)) return name;
     }
 }
 
 void ViewerApp::write_picture() {
-    const std::string png = numbered("picture", ".png");
+    const std::string png = free_name("picture", ".png");
     const Image image = session_->renderer.read();
-    write_image(png, image, PixelType::half_float,
-                is_light(layer_) ? std::optional(exposure_) : std::nullopt);
+    Image shown = image; // as the window shows it
+    if (is_light(layer_) && !tone_mapped_)
+        for (float& value : shown.rgb) value *= exposure_;
+    write_image(png, shown, PixelType::half_float,
+                is_light(layer_) && tone_mapped_ ? std::optional(exposure_) : std::nullopt);
     write_image(png.substr(0, png.size() - 4) + ".exr", image, PixelType::full_float);
     message_ = "wrote " + png + " and .exr";
 }
@@ -282,12 +288,14 @@ void ViewerApp::draw_picture() {
     renderer.draw(session_->camera, layer_, most_new_);
     const double patches = renderer.timings().patches;
     if (renderer.patches_missing() > 0 && patches > 0.0)
-        most_new_ = std::max(fewest_new, static_cast<std::size_t>(static_cast<double>(most_new_)
-                                                                  * std::clamp(most_patch_seconds / patches, 0.5, 1.5)));
+        most_new_ = std::clamp(static_cast<std::size_t>(static_cast<double>(most_new_)
+                                                        * std::clamp(most_patch_seconds / patches, 0.5, 1.5)),
+                               fewest_new, most_at_once);
     tone_map_.reset();
     if (tone_mapped_ && is_light(layer_)) tone_map_.emplace(renderer.read(), exposure_);
     times_.frame = renderer.timings();
     remember(frame_history_, times_.frame.total());
+    drawn_ = session_->camera;
     picture_is_old_ = has_indirect_light(layer_) && renderer.patches_missing() > 0;
 }
 
@@ -302,11 +310,10 @@ void ViewerApp::step() {
         precompute_.reset();
     }
     if (!session_) {
-        if (!precompute_) throw Error(message_);
+        if (!precompute_ && !window_.should_close()) throw Error(message_);
         draw_waiting();
         return;
     }
-    const Camera before = session_->camera;
     play();
     fly_with_keys(seconds);
     session_->camera.width = window_.width();
@@ -321,7 +328,7 @@ void ViewerApp::step() {
     }
     const Camera& camera = session_->camera;
     if (window_.width() < 1 || window_.height() < 1) return; // minimised
-    if (camera != before) picture_is_old_ = true;
+    if (camera != drawn_) picture_is_old_ = true;
     if (picture_is_old_) draw_picture();
     draw_window();
 }
@@ -353,7 +360,7 @@ void ViewerApp::draw_window() {
     }
     gui_.end();
     if (picture_wanted_) attempt([&] { write_picture(); });
-    if (screenshot_wanted_) attempt([&] { write_screenshot(numbered("window", ".png")); });
+    if (screenshot_wanted_) attempt([&] { write_screenshot(free_name("window", ".png")); });
     picture_wanted_ = screenshot_wanted_ = false;
     window_.swap();
 }
@@ -471,6 +478,7 @@ void ViewerApp::draw_precompute_panel() {
     if (ImGui::Button("cancel")) {
         precompute_.reset();
         message_ = "precomputation cancelled";
+        if (!session_) window_.close(); // there is nothing else to show
     }
 }
 

@@ -22,7 +22,7 @@ struct ViewerOptions {
     ViewLayer layer = ViewLayer::full;
     int width = 1280, height = 720;
     float exposure = 0.18f;
-    std::string folder = "."; // of pictures and recorded paths
+    std::string folder = "."; // of pictures, recorded paths and transfer files
 };
 
 /// The window: a scene to walk through, a light to hold. docs/viewer.md says what a person can do.
@@ -52,6 +52,7 @@ private:
     std::optional<ToneMap> tone_map_;
     std::string message_; // the last thing to tell
     bool picture_is_old_ = true;
+    std::optional<Camera> drawn_; // the camera of the last picture
     std::size_t most_new_ = 2000; // patches a picture, so that it takes about most_patch_seconds
     bool picture_wanted_ = false, screenshot_wanted_ = false; // to be written when they are drawn
 
@@ -102,7 +103,8 @@ private:
     void draw_times_panel();
     void draw_file_panel();
     void draw_precompute_panel();
-    std::string numbered(const std::string& kind, const std::string& ending) const;
+    /// A name in the folder that no file has: of STEM ENDING, with a number between where need be, or always.
+    std::string free_name(const std::string& stem, const std::string& ending, bool always_numbered = true) const;
 };
 
 } // namespace afterglow

@@ -6,7 +6,9 @@
 
 #include <csignal>
 #include <cstring>
+#include <fcntl.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 namespace afterglow {
 namespace {
@@ -85,6 +87,35 @@ TEST(WriteAtomically, WritesThroughASymbolicLink) {
     EXPECT_EQ(content_of(target), "new");
 }
 
+TEST(WriteAtomically, WritesThroughALinkToWhatIsNotThereYet) {
+    const TemporaryFolder folder;
+    std::filesystem::create_symlink("target.txt", folder.path("one.txt"));
+    std::filesystem::create_symlink(folder.path("one.txt"), folder.path("two.txt"));
+    write_text(folder.path("two.txt"), "new");
+    EXPECT_TRUE(std::filesystem::is_symlink(folder.path("one.txt")));
+    EXPECT_TRUE(std::filesystem::is_symlink(folder.path("two.txt")));
+    EXPECT_EQ(content_of(folder.path("target.txt")), "new");
+    std::filesystem::create_symlink("ring.txt", folder.path("ring.txt"));
+    EXPECT_THROW(write_text(folder.path("ring.txt/a.txt"), "text"), FileError);
+}
+
+TEST(WriteAtomically, WritesToWhatTheProcessHasOpen) {
+    // As a shell hands over "program -o /dev/stdout >> all.txt": what is there stays.
+    const TemporaryFolder folder;
+    const std::string path = folder.write("all.txt", "first ");
+    const int open = ::open(path.c_str(), O_WRONLY | O_APPEND);
+    ASSERT_GE(open, 0);
+    const std::string number = std::to_string(open);
+    std::filesystem::create_symlink("/dev/fd/" + number, folder.path("link"));
+    write_text("/dev/fd/" + number, "second ");
+    write_text("/proc/self/fd/" + number, "third ");
+    write_text(folder.path("link"), "fourth");
+    ::close(open);
+    EXPECT_EQ(content_of(path), "first second third fourth");
+    EXPECT_THROW(write_text("/dev/fd/" + number, "text"), FileError); // it is closed now
+    EXPECT_EQ(folder.count(), 2u);
+}
+
 TEST(WriteAtomically, RefusesAFolderAndAMissingFolder) {
     const TemporaryFolder folder;
     EXPECT_THROW(write_text(folder.path(""), "text"), FileError);
@@ -98,10 +129,11 @@ TEST(WriteAtomically, RemovesWhatAKilledProcessLeftOfItsTargetAlone) {
     folder.write("a.txt.part-123-0", "half of it");
     folder.write("b.txt.part-123-0", "another target's");
     folder.write("a.txt.part-of-mine", "somebody's own file");
+    folder.write("a.txt.part-00", "what split -d makes of it");
     write_text(path, "new");
     EXPECT_EQ(content_of(path), "new");
     EXPECT_FALSE(std::filesystem::exists(folder.path("a.txt.part-123-0")));
-    EXPECT_EQ(folder.count(), 3u);
+    EXPECT_EQ(folder.count(), 4u);
 }
 
 TEST(WriteAtomically, TwoAtATimeDoNotDisturbEachOther) {

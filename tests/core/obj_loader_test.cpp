@@ -179,6 +179,33 @@ TEST(ObjLoader, ReadsAnyLineEndBlanksAndComments) {
     }
 }
 
+TEST(ObjLoader, JoinsLinesThatEndInABackslash) {
+    for (const std::string end : {"\n", "\r\n", "\r"}) {
+        const std::string on = " \\" + end;
+        const Scene scene = load_text("# C:\\scenes\\" + end + "v 0 0" + on + "0" + end + "v 1 0 0" + end + "v 1" + on + "1" + on
+                                      + on + "0" + end + "f 1" + on + "2 3" + on);
+        expect_sound(scene);
+        EXPECT_EQ(scene.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+        EXPECT_EQ(scene.positions[2], Vec3(1, 1, 0));
+        EXPECT_EQ(scene.summary.dropped_bad_index, 0u);
+    }
+}
+
+TEST(ObjLoader, EndsFacesAtAComment) {
+    const Scene scene = load_text(square_corners + "f 1 2 3 # the floor, 4 \nf 1 3 4# 2\nf 1 2 3 # 12345678901\n");
+    expect_sound(scene);
+    EXPECT_EQ(scene.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {0, 1, 2}}));
+    EXPECT_EQ(scene.summary.dropped_bad_index, 0u);
+}
+
+TEST(ObjLoader, LeavesOutAByteOrderMark) {
+    const TemporaryFolder folder;
+    folder.write("a.mtl", "\xef\xbb\xbfnewmtl wall\nKd 0.2 0.4 0.6\n");
+    const Scene scene = load_obj(folder.write("a.obj", "\xef\xbb\xbf" + square_corners + "mtllib a.mtl\nusemtl wall\nf 1 2 3\n"));
+    EXPECT_EQ(scene.summary.line(), "1 faces, 1 triangles");
+    EXPECT_EQ(scene.materials[0].name, "wall");
+}
+
 TEST(ObjLoader, ReadsNumbersInAnyLocale) {
     const std::string before = std::setlocale(LC_ALL, nullptr);
     for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"})
@@ -293,6 +320,41 @@ TEST(ObjMaterials, AreTakenLinearFromTheMtlFile) {
     EXPECT_EQ(scene.summary.line(), "1 faces, 1 triangles");
 }
 
+TEST(ObjMaterials, ComeFromAllFilesOfALine) {
+    const TemporaryFolder folder;
+    folder.write("a.mtl", "newmtl a\nKd 0.1 0.1 0.1\n");
+    folder.write("b.mtl", "newmtl b\nKd 0.2 0.2 0.2\n");
+    const Scene scene = load_obj(folder.write(
+        "a.obj", "mtllib a.mtl b.mtl\n" + square_corners + "usemtl b\nf 1 2 3\nusemtl a\nf 1 3 4\n"));
+    expect_sound(scene);
+    ASSERT_EQ(scene.materials.size(), 2u);
+    EXPECT_EQ(scene.materials[0].name, "b");
+    EXPECT_TRUE((scene.materials[0].reflectance == 0.2f).all());
+    EXPECT_EQ(scene.summary.line(), "2 faces, 2 triangles");
+}
+
+TEST(ObjMaterials, OfOneNumberAreGrey) {
+    const TemporaryFolder folder;
+    folder.write("a.mtl", "newmtl wall\n  Kd 0.25 # all three\n");
+    const Scene scene =
+        load_obj(folder.write("a.obj", "mtllib a.mtl\n" + square_corners + "usemtl wall\nf 1 2 3\n"));
+    EXPECT_TRUE((scene.materials[0].reflectance == 0.25f).all());
+}
+
+TEST(ObjMaterials, OfATextureAloneAreWhiteTimesIt) {
+    // Wherever they stand: what a material before them says is not theirs.
+    const TemporaryFolder folder;
+    write_picture(folder.path("picture.png"));
+    const std::string textured = "newmtl wall\nmap_Kd picture.png\n", plain = "newmtl a\nKd 0.25 0.5 0.75\n";
+    for (const std::string& mtl : {textured + plain, plain + textured, textured}) {
+        folder.write("a.mtl", mtl);
+        const Scene scene = load_obj(folder.write("a.obj", "mtllib a.mtl\n" + textured_square));
+        expect_sound(scene);
+        EXPECT_TRUE((scene.materials[0].reflectance == 0.999f).all()) << mtl;
+        EXPECT_EQ(scene.summary.line(), "1 faces, 2 triangles");
+    }
+}
+
 TEST(ObjMaterials, AreClampedAndCounted) {
     const TemporaryFolder folder;
     folder.write("a.mtl", "newmtl a\nKd 1 1 1\nnewmtl b\nKd -1 0.5 7\nnewmtl c\nKd 0.9 0.9 0.9\n");
@@ -365,6 +427,27 @@ TEST(ObjTextures, AreDecodedFromSrgbAndStandUpright) {
     expect_near(seen_at(0.75f, 0.25f), {0.5f, 0, 0});
     expect_near(seen_at(0.25f, 0.75f), Rgb::Zero());
     expect_near(seen_at(0.75f, 0.75f), Rgb::Constant(0.5f)); // top right
+}
+
+TEST(ObjTextures, AreScaledAndShiftedAsTheirOptionsSay) {
+    const TemporaryFolder folder;
+    write_picture(folder.path("the picture.png"));
+    for (const char* options : {"-s 2 -0.5 1 -o 0.25 0.125 0", "-s 2 -0.5 -o 0.25 0.125", "-o 0.25 0.125 -bm 1 -s 2 -0.5"}) {
+        folder.write("a.mtl", std::string("newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd ") + options
+                                  + " the picture.png \nnewmtl plain\nKd 0.5 0.5 0.5\nmap_Kd the picture.png\n");
+        const Scene scene = load_obj(folder.write("a.obj", "mtllib a.mtl\n" + textured_square + "usemtl plain\nf 1/1 2/2 3/3\n"));
+        expect_sound(scene);
+        EXPECT_EQ(scene.summary.line(), "2 faces, 3 triangles") << options;
+        ASSERT_EQ(scene.textures.size(), 1u);
+        const auto at = [&](std::size_t triangle, std::size_t corner) {
+            return scene.texture_coordinates[scene.texture_indices[triangle][corner]];
+        };
+        EXPECT_EQ(at(0, 0), Vec2(0.25f, 0.125f)) << options;
+        EXPECT_EQ(at(0, 2), Vec2(2.25f, -0.375f)) << options;
+        EXPECT_EQ(at(1, 2), Vec2(0.25f, -0.375f)) << options;
+        EXPECT_EQ(at(2, 2), Vec2(1.0f, 1.0f)) << options; // the other material's are its own
+        EXPECT_EQ(scene.texture_coordinates.size(), 8u);
+    }
 }
 
 TEST(ObjTextures, ThatAreMissingOrDamagedAreNamedOnceAndIgnored) {

@@ -72,7 +72,7 @@ TEST(CommandChart, MeasuresSomeSweepsAlone) {
     EXPECT_FALSE(std::filesystem::exists(folder.path("c/map_builtin_cornell.json")));
 
     // The path tracer alone has no files to draw.
-    const Outcome traced = run("chart builtin:cornell --brief -o '" + folder.path("p") + "' --sweeps path=4");
+    const Outcome traced = run("chart --brief --sweeps path=4 builtin:cornell -o '" + folder.path("p") + "'");
     EXPECT_EQ(traced.status, 0) << traced.err;
     EXPECT_TRUE(std::filesystem::exists(folder.path("p/error_time_builtin_cornell.png")));
     EXPECT_FALSE(std::filesystem::exists(folder.path("p/error_bytes_builtin_cornell.png")));

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <string>
 
 namespace afterglow {
@@ -83,7 +84,7 @@ TEST(CommandLine, RefusesNumbersThatNoSceneCanHave) {
 }
 
 TEST(CommandLine, LosesNoFileToAnother) {
-    const TemporaryFolder folder;
+    const TemporaryFolder folder, tabbed;
     const std::string scene = folder.write("s.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     const std::string points = folder.write("p.csv", "0,0,0,0,1,0\n");
     const std::string content = content_of(scene);
@@ -99,7 +100,8 @@ TEST(CommandLine, LosesNoFileToAnother) {
           "query '" + scene + "' --points '" + points + "' -o '" + scene + "'" + light,
           "render '" + scene + "' -o '" + one + ".jpg'" + light + camera,
           "reference builtin:cornell -o '" + one + ".jpg'" + light + camera,
-          "precompute '" + folder.path("caf\xe9.obj") + "'" + draft + one + "'"}) {
+          "precompute '" + folder.path("caf\xe9.obj") + "'" + draft + one + "'",
+          "precompute '" + tabbed.write("s\tt/s.obj", content) + "'" + draft + one + "'"}) {
         SCOPED_TRACE(arguments);
         expect_failure(run(arguments), 2);
     }
@@ -112,7 +114,10 @@ TEST(CommandLine, FaultsOfFilesAreStatusOneAndLeaveNothingBehind) {
     const std::string bad = inputs.write("bad.csv", "0.1,0.2,0.3,0,1,0\n1,2\n");
     const std::string values = inputs.write("e.csv", "1,2,3\n");
     const std::string more = inputs.write("f.csv", "1,2,3\n4,5,6\n");
-    const std::string picture = " -o '" + folder.path("a.exr") + "'";
+    const std::string odd = inputs.path("odd.exr"), picture = " -o '" + folder.path("a.exr") + "'";
+    Image black(1, 1);
+    black.attributes["afterglow.relative_standard_error"] = "n/a";
+    write_image(odd, black, PixelType::full_float);
     const std::string table = " -o '" + folder.path("a.csv") + "'";
     for (const std::string& arguments :
          {"reference '" + folder.path("none.obj") + "'" + picture + light + camera,
@@ -122,11 +127,19 @@ TEST(CommandLine, FaultsOfFilesAreStatusOneAndLeaveNothingBehind) {
           "reference builtin:cornell --quiet --spp 2 -o '" + folder.path("no/such/a.exr") + "'"
               + light + camera,
           "compare '" + folder.path("a.exr") + "' '" + folder.path("b.exr") + "'",
+          "compare '" + odd + "' '" + odd + "'",
           "compare '" + values + "' '" + more + "'"}) {
         SCOPED_TRACE(arguments);
         expect_failure(run(arguments), 1);
     }
     EXPECT_EQ(folder.count(), 0u);
+}
+
+TEST(CommandLine, WritesToADevice) {
+    const Outcome made = run("precompute builtin:furnace --coarse-radius 1 --rays 64 --no-verification -o /dev/null --report /dev/null");
+    EXPECT_EQ(made.status, 0) << made.err;
+    EXPECT_NE(made.err.find("/dev/null: "), std::string::npos) << made.err;
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
 }
 
 TEST(CommandLine, ReferencePictureCarriesItsProvenanceAndEqualsItself) {

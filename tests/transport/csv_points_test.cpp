@@ -35,6 +35,15 @@ TEST(CsvPoints, AreReadWithAndWithoutAHeader) {
     }
 }
 
+TEST(CsvPoints, TooSmallForAFloatAreZero) {
+    // The cube of cos(pi / 2) in double, and less than a double holds before a comma.
+    const TemporaryFolder folder;
+    const auto points = read_points_csv(folder.write("points.csv", "2.295e-49,-1e-300,1e-40,1e-45,2,-3e-50\n"));
+    ASSERT_EQ(points.size(), 1u);
+    EXPECT_EQ(points[0].position, Vec3(0.0f, 0.0f, 1e-40f));
+    EXPECT_EQ(points[0].normal, Vec3::UnitY());
+}
+
 TEST(CsvPoints, FaultsAreNamedWithTheirLine) {
     const std::string good = "x,y,z,nx,ny,nz\n1,2,3,0,0,1\n";
     for (const char* bad : {"1,2,3,0,0", "1,2,3,0,0,1,7", "1,2,3,0,0,1,", "1,2,three,0,0,1",

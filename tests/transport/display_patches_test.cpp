@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace afterglow {
@@ -147,18 +148,53 @@ TEST(DisplayPatches, AreTheSameAtAnyNumberOfThreads) {
 }
 
 TEST(DisplayPatches, ForgetAllWhenThereAreTooMany) {
-    DisplayPatches patches(cornell().basis, cornell().level(), {.most_patches = 3000});
-    std::vector<std::uint32_t> patch;
-    for (const float x : {0.1f, 0.2f, 0.3f, 0.4f}) {
-        Camera camera = cornell_camera();
-        camera.position.x() = x;
-        const Pixels pixels(cornell().surface, camera);
-        patches.find(pixels.view(), DisplayPatches::no_limit, patch);
-        EXPECT_LT(relative_error(cornell(), pixels, read(cornell(), pixels, patches, patch)), 0.1);
+    // Also where two a pixel are fewer than the most, and where it is small ones that are too many.
+    struct Case {
+        int width, height;
+        std::size_t most;
+        double error; // of so few pixels, which are far apart, it is left open
+    };
+    for (const Case& c : {Case{160, 120, 3000, 0.1}, Case{40, 30, 3000, 1.0}}) {
+        DisplayPatches patches(cornell().basis, cornell().level(), {.most_patches = c.most});
+        std::vector<std::uint32_t> patch;
+        for (int k = 0; k < 40; ++k) {
+            Camera camera = cornell_camera(c.width, c.height);
+            camera.position.x() = 0.05f + 0.01f * static_cast<float>(k);
+            const Pixels pixels(cornell().surface, camera);
+            EXPECT_EQ(patches.find(pixels.view(), DisplayPatches::no_limit, patch), 0u) << k;
+            EXPECT_LE(patches.patches(), std::max(c.most, 2 * patch.size()));
+            EXPECT_LT(relative_error(cornell(), pixels, read(cornell(), pixels, patches, patch)), c.error);
+        }
+        EXPECT_GT(patches.generation(), 0u);
+        EXPECT_EQ(patches.begin().size(), patches.patches() + 1);
+        EXPECT_EQ(patches.begin().back(), patches.entries().size());
     }
-    EXPECT_GT(patches.generation(), 0u);
-    EXPECT_EQ(patches.begin().size(), patches.patches() + 1);
-    EXPECT_EQ(patches.begin().back(), patches.entries().size());
+}
+
+TEST(DisplayPatches, AreTheSameFromWhereverACameraComes) {
+    // Small patches seen from afar are as large as large ones of a camera sixteen times as close.
+    const auto camera_at = [](float distance) {
+        Camera camera = cornell_camera();
+        const Vec3 at(0.13f, 0.0f, 0.09f); // the foot of a block
+        camera.position = at + distance * Vec3(0.3f, 0.5f, -1.0f).normalized();
+        camera.target = at;
+        return camera;
+    };
+    const Pixels far(cornell().surface, camera_at(1.6f)), close(cornell().surface, camera_at(0.1f));
+    DisplayPatches alone(cornell().basis, cornell().level(), {}), after(cornell().basis, cornell().level(), {});
+    std::vector<std::uint32_t> patch;
+    alone.find(close.view(), DisplayPatches::no_limit, patch);
+    const auto expected = read(cornell(), close, alone, patch);
+    after.find(far.view(), DisplayPatches::no_limit, patch);
+    after.find(close.view(), DisplayPatches::no_limit, patch);
+    const auto found = read(cornell(), close, after, patch);
+    double squares = 0.0, mean = 0.0;
+    for (std::size_t p = 0; p < found.size(); ++p)
+        for (std::size_t c = 0; c < 3; ++c) {
+            squares += std::pow(found[p][c] - expected[p][c], 2);
+            mean += expected[p][c];
+        }
+    EXPECT_LT(std::sqrt(squares * 3.0 * static_cast<double>(found.size())) / mean, 3e-4);
 }
 
 TEST(DisplayPatches, NeedNoSurface) {

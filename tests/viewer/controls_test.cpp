@@ -95,6 +95,15 @@ TEST(LightControl, AimsAndWidensAndGoesToTheCamera) {
     EXPECT_LE(light.outer_angle, 180.0f);
     for (int k = 0; k < 50; ++k) widen(light, 0.5f);
     EXPECT_GT(light.outer_angle, 0.0f);
+    for (int tenths = 5; tenths < 1600; ++tenths) // a hard cone stays so, however angles round
+        for (const float factor : {1.1f, 1.0f / 1.1f}) {
+            Spotlight hard = light;
+            hard.inner_angle = hard.outer_angle = 0.1f * static_cast<float>(tenths);
+            const float before = hard.outer_angle;
+            widen(hard, factor);
+            EXPECT_NE(hard.outer_angle, before == 0.5f ? 0.0f : before);
+            EXPECT_EQ(hard.inner_angle, hard.outer_angle);
+        }
     put_at_camera(light, camera);
     EXPECT_EQ(light.position, camera.position);
     EXPECT_LT((light.direction + Vec3::UnitZ()).norm(), 1e-6f);

@@ -136,6 +136,23 @@ TEST_P(OnContext, DirectLightIsThatOfShadowRaysButForShadowEdges) {
     }
 }
 
+TEST_P(OnContext, DirectLightFollowsIntensityAndInnerAngleAlone) {
+    // Neither needs another shadow map.
+    const TransferScene& scene = opened(cornell);
+    auto dark = std::make_shared<DisplayField>(scene.file.transfer.points);
+    const auto drawn = [&](Renderer& renderer, const Spotlight& light) {
+        renderer.set_light(light, dark);
+        renderer.draw(cornell_camera(), ViewLayer::direct);
+        return renderer.read();
+    };
+    Spotlight other = spot(50.0f);
+    other.intensity *= Rgb(8.0f, 1.0f, 0.0f);
+    other.inner_angle = 10.0f;
+    Renderer renderer(context->gl(), scene, IndirectMethod::gather), fresh(context->gl(), scene, IndirectMethod::gather);
+    drawn(renderer, spot(50.0f));
+    EXPECT_EQ(drawn(renderer, other).rgb, drawn(fresh, other).rgb);
+}
+
 TEST_P(OnContext, FullLightIsDirectAndIndirect) {
     const TransferScene& scene = opened(cornell);
     LightSolver solver(scene, 0);
