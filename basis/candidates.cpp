@@ -91,7 +91,8 @@ std::vector<Vec3> places_in_box(const Surface& surface, int count, std::uint64_t
     std::vector<Vec3> places;
     for (int i = 0; i < count; ++i) {
         Rng rng(seed, static_cast<std::uint64_t>(i));
-        const Vec3 u(rng.uniform(), rng.uniform(), rng.uniform());
+        const float z = rng.uniform(), y = rng.uniform(), x = rng.uniform(); // in this order by any compiler
+        const Vec3 u(x, y, z);
         places.push_back(box.min() + box.sizes().cwiseProduct(u));
     }
     return places;
@@ -217,7 +218,8 @@ void CandidateSource::ensure(std::size_t count) {
             length_count_ += path.hits;
             rays_ += path.rays;
         }
-        if (places_.size() == before && ++fruitless > 8)
+        fruitless = places_.size() == before ? fruitless + 1 : 0;
+        if (fruitless > 8)
             throw Error("no surface is reached from the viewpoint; name another with --viewpoint");
     }
 }

@@ -34,7 +34,7 @@ public:
     Candidate operator[](std::size_t i) const;
     std::size_t size() const { return places_.size(); }
 
-    /// Mean length of the particles' segments that end on a surface [world]: the typical distance
+    /// Mean length of the particles' segments that end in a candidate [world]: the typical distance
     /// over which light travels here.
     double mean_ray_length() const;
     std::uint64_t rays() const { return rays_; }

@@ -17,7 +17,7 @@ inline float squashed_distance2(const Vec3& d, const Vec3& n) {
 }
 
 /// The one replaceable piece of the basis: how strongly weights and point placement tell normals
-/// apart, how far supports reach, and whether placement sees the openness feature.
+/// apart, and how far supports reach.
 struct BasisShape {
     /// w_j(x) = K(d_j(x) / r_j) max(0, n . n_j)^weight_power [LZT08, eq. (8): power 2].
     int weight_power = 8;

@@ -179,8 +179,10 @@ void write_atomically(const std::string& path, const std::function<void(OutputFi
         }
     }
 
+    const bool replaces = status.st_nlink > 0;
     remove_left_behind(target);
     UnfinishedFile unfinished(target);
+    if (replaces) ::fchmod(unfinished.descriptor(), status.st_mode & 07777); // who may read it stays so
     OutputFile output(path, unfinished.descriptor());
     write(output);
     unfinished.rename_to(target, path);

@@ -47,6 +47,21 @@ private:
 #endif
 };
 
+/// Flushes denormals to zero, in this thread, while it lives.
+class DenormalsOff {
+public:
+    DenormalsOff() {
+        _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
+        _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+    }
+    ~DenormalsOff() { _mm_setcsr(before_); }
+    DenormalsOff(const DenormalsOff&) = delete;
+    DenormalsOff& operator=(const DenormalsOff&) = delete;
+
+private:
+    const unsigned before_ = _mm_getcsr();
+};
+
 } // namespace
 
 ThreadLimit::ThreadLimit(int threads)
@@ -73,8 +88,7 @@ void parallel_ranges(Index count, Index grain, const std::function<void(Index, I
         tbb::blocked_range<Index>(0, chunks, 1),
         [&](const tbb::blocked_range<Index>& range) {
             const ForkJoin::Body ordered(loop);
-            _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
-            _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+            const DenormalsOff flushed;
             for (Index c = range.begin(); c < range.end(); ++c)
                 body(c * grain, std::min(count, (c + 1) * grain));
         },

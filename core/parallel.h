@@ -31,7 +31,7 @@ int thread_count();
 
 /// Calls body(begin, end) for consecutive ranges that cover [0, count), each at most `grain` long
 /// and starting at a multiple of it, so that the split never depends on the number of threads.
-/// Denormals are flushed to zero inside. An exception of any body is thrown again here.
+/// Denormals are flushed to zero inside, and there alone. An exception of any body is thrown again here.
 void parallel_ranges(Index count, Index grain, const std::function<void(Index, Index)>& body);
 
 /// Does work that has parallel loops of its own and that other threads wait for (a lock, a once_flag): a

@@ -145,10 +145,12 @@ MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
 
     constexpr int pilot_batches = 8;
     constexpr Index pilot_samples = 16; // a batch
-    BatchSums pilot(items, outputs, pilot_batches, hash64(options.seed, 2));
-    pilot.extend(
-        sampler, [](Index) { return pilot_samples; }, nullptr);
-    const MeanEstimate first = pilot.estimate();
+    const MeanEstimate first = [&] {
+        BatchSums pilot(items, outputs, pilot_batches, hash64(options.seed, 2));
+        pilot.extend(
+            sampler, [](Index) { return pilot_samples; }, nullptr);
+        return pilot.estimate();
+    }();
     const std::vector<double> share = shares(first, items, outputs);
 
     const int batches = std::max(2, options.batches);

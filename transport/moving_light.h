@@ -34,8 +34,8 @@ struct MovingLightStatistics {
 ///
 /// The links to each level of receivers are multiplied by themselves: those to coarse levels are many and
 /// small. A column of a level's links T_j waits while |change of c_j| |T_j| < tau sqrt(links of T_j), tau = 0.7
-/// tolerance |T c| / sqrt(all links), so that all that wait together change the field's root mean square
-/// by less than 0.7 `tolerance` of it. The light has settled when all changes together are below the
+/// tolerance |V| / sqrt(all links), V the display level's field, so that all that wait together change its root mean
+/// square by less than 0.7 `tolerance` of it. The light has settled when all changes together are below the
 /// tolerance, or would be in the next round by what rounds have passed on to the next so far. The display
 /// level's links are few, and all multiplied when a pose ends.
 class MovingLight {
@@ -45,7 +45,8 @@ public:
         int most_rounds = 0; // a pose; 0: until it has settled
     };
 
-    /// Keeps a reference. Links are copied after the first pose, in the background: 4 bytes each.
+    /// Keeps a reference. Links are copied after the first pose, in the background: 4 bytes each; those to the display
+    /// level within it, 8 bytes each.
     MovingLight(const LightTransport& transport, const Options& options);
 
     /// Indirect vector irradiance at all points under the light, until the next call. The same poses in

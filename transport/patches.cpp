@@ -52,7 +52,7 @@ std::uint64_t hash_of(const Likeness& key) {
 
 PatchGrid::PatchGrid(const Scene& scene, float size, const Eigen::AlignedBox3f& used)
     : scene_(scene), size_(size), cells_(scene.triangles.size()) {
-    constexpr float most_along = 1024.0f;
+    constexpr float most_along = 1024.0f, many_along = 16.0f;
     std::uint64_t cells = 0;
     std::vector<std::uint32_t> small;
     for (std::uint32_t t = 0; t < cells_.size(); ++t) {
@@ -66,7 +66,8 @@ PatchGrid::PatchGrid(const Scene& scene, float size, const Eigen::AlignedBox3f& 
         }
         const float along_u = std::max(1.0f, std::ceil(ab.norm() / size));
         const float along_v = std::max(1.0f, std::ceil(ac.norm() / size));
-        if (std::max(along_u, along_v) > most_along) {
+        const Eigen::AlignedBox3f box = Eigen::AlignedBox3f(a).extend(a + ab).extend(a + ac);
+        if (const float along = std::max(along_u, along_v); along > most_along || (along > many_along && !used.contains(box))) {
             windows_.push_back(used_window(a, ab, ac, used));
             windows_.back().first = static_cast<std::uint32_t>(cells);
             cells_[t] = {static_cast<std::uint32_t>(windows_.size() - 1), 0, 0};
@@ -268,8 +269,9 @@ std::array<Hit, 4> PatchGrid::corners(std::uint32_t patch) const {
 
 float PatchGrid::area_of(std::uint32_t triangle) const {
     const Triangle& corner = scene_.triangles[triangle];
-    const Vec3& a = scene_.positions[corner[0]];
-    return 0.5f * (scene_.positions[corner[1]] - a).cross(scene_.positions[corner[2]] - a).norm();
+    const auto position = [&](int c) -> Eigen::Vector3d { return scene_.positions[corner[c]].cast<double>(); };
+    const Eigen::Vector3d a = position(0); // fourth powers of lengths need not fit a float
+    return static_cast<float>(0.5 * (position(1) - a).cross(position(2) - a).norm());
 }
 
 float PatchGrid::area(std::uint32_t patch) const {

@@ -17,8 +17,8 @@ namespace afterglow {
 /// hit is a few operations away. Triangles with no edge longer than half the size share a cell with
 /// others like them: those whose centroids lie in one cube three quarters of the size long, whose normals
 /// are within some 20 degrees and whose material is the same; so that cells become no more than the
-/// surface needs, however fine its triangles. Of a triangle with edges of more than 1024 cells (the ground that
-/// a room stands on) only what lies in the box that is used has cells of its own; what is beyond counts to
+/// surface needs, however fine its triangles. Of a triangle with edges of more than 1024 cells, or of more than
+/// 16 and not within the box that is used (the ground that a room stands on), only what lies in that box has cells of its own; what is beyond counts to
 /// those at the box's border. Both sides of a cell have ids of their own: 2 * cell +
 /// back side.
 class PatchGrid {

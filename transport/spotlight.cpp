@@ -13,9 +13,10 @@ void Spotlight::check() {
     if (!direction.allFinite() || !intensity.allFinite()
         || !std::isfinite(inner_angle) || !std::isfinite(outer_angle))
         throw UsageError("a spotlight's direction, cone and intensity must be finite");
-    if (!(inner_angle >= 0.0f && inner_angle <= outer_angle && outer_angle > 0.0f
+    constexpr float narrowest = 0.05f; // cosines of less are hardly below one
+    if (!(inner_angle >= 0.0f && inner_angle <= outer_angle && outer_angle >= narrowest
           && outer_angle <= 180.0f))
-        throw UsageError("a spotlight's cone must satisfy 0 <= inner <= outer <= 180 and outer > 0 "
+        throw UsageError("a spotlight's cone must satisfy 0 <= inner <= outer <= 180 and outer >= 0.05 "
                          "(half-angles in degrees), not "
                          + std::to_string(inner_angle) + "," + std::to_string(outer_angle));
     if ((intensity < 0.0f).any()) throw UsageError("a spotlight's intensity must not be negative");

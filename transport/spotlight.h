@@ -16,7 +16,7 @@ struct Spotlight {
     float outer_angle = 45.0f;       // half-angle where it ends [degrees]; equal to inner: hard
     Rgb intensity = Rgb::Ones();     // W/sr on the axis
 
-    /// Normalises the direction. Throws UsageError unless 0 <= inner <= outer <= 180, outer > 0,
+    /// Normalises the direction. Throws UsageError unless 0 <= inner <= outer <= 180, outer >= 0.05,
     /// the direction is not zero and everything is finite (intensity also not negative).
     void check();
     /// Whether another differs in intensity at most.

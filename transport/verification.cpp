@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace afterglow {
 namespace {
@@ -106,12 +107,16 @@ Trial random_trial(const Surface& surface, const std::vector<Vec3>& viewpoints, 
         trial.eyes.push_back(trial.lights.back().position);
         trial.eyes.push_back(free.next());
     }
+    const auto eyes = static_cast<std::uint32_t>(trial.eyes.size());
     for (std::uint32_t k = 0; static_cast<int>(trial.places.size()) < places; ++k) {
         if (k >= 100u * static_cast<std::uint32_t>(places)) return {};
-        const Vec3& eye = trial.eyes[k % trial.eyes.size()];
-        const Vec3 direction = sample_sphere(scrambled_sobol2(k, hash64(seed, 0x9147)));
-        if (const Hit hit = surface.closest_hit({eye, direction})) trial.places.push_back(surface.point(hit));
+        const std::uint32_t eye = k % eyes; // each has a sequence of its own: every second point has half the directions
+        const Vec3 direction = sample_sphere(scrambled_sobol2(k / eyes, hash64(seed, 0x9147 + eye)));
+        if (const Hit hit = surface.closest_hit({trial.eyes[eye], direction})) trial.places.push_back(surface.point(hit));
     }
+    Rng rng(seed, 0x9147); // in no order: some of them are as good as all
+    for (std::size_t k = trial.places.size(); k > 1; --k)
+        std::swap(trial.places[k - 1], trial.places[static_cast<std::size_t>(rng.next() % k)]);
     return trial;
 }
 

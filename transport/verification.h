@@ -15,7 +15,7 @@ namespace afterglow {
 struct Trial {
     std::vector<Spotlight> lights;
     std::vector<Vec3> eyes; // two a light: where it is, and another place in the open
-    std::vector<SurfacePoint> places; // in sight of the eyes
+    std::vector<SurfacePoint> places; // in sight of the eyes, in no order
 };
 
 /// A trial at random: spotlights of 20 to 50 degrees in the open, where the harmonic mean of the

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/seconds.h"
 #include "viewer/frame_path.h"
 #include "viewer/gl_context.h"
 #include "viewer/light_solver.h"
@@ -86,7 +87,7 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
         ++rounds;
         const std::vector<std::string>& errors = context->gl().errors();
         if (!errors.empty()) throw Error("OpenGL: " + errors.front());
-    } while (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < options.seconds);
+    } while (seconds_since(start) < options.seconds);
 
     const Json report = {{"version", AFTERGLOW_VERSION},
                          {"opengl", context->gl().renderer()},

@@ -1,10 +1,10 @@
 #include "viewer/precompute_task.h"
 
 #include "core/error.h"
+#include "core/seconds.h"
 
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -20,10 +20,6 @@ extern char** environ;
 namespace afterglow {
 namespace {
 
-double now() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 std::string program() {
     std::error_code none;
     const std::filesystem::path here = std::filesystem::read_symlink("/proc/self/exe", none).parent_path();
@@ -36,7 +32,7 @@ std::string program() {
 } // namespace
 
 PrecomputeTask::PrecomputeTask(const std::string& scene, const std::string& file)
-    : file_(file), start_(now()) {
+    : file_(file), start_(clock_seconds()) {
     // A terminal of its own, to which it tells its progress as it would to a person's.
     const int here = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
     const char* name = here >= 0 && grantpt(here) == 0 && unlockpt(here) == 0 ? ptsname(here) : nullptr;
@@ -72,7 +68,7 @@ void PrecomputeTask::stop() {
     if (process_ > 0 && state_ == State::at_work) kill(process_, SIGTERM);
 }
 
-double PrecomputeTask::seconds() const { return now() - start_; }
+double PrecomputeTask::seconds() const { return clock_seconds() - start_; }
 
 void PrecomputeTask::read_output() {
     std::array<char, 512> text{};

@@ -1,6 +1,7 @@
 #include "viewer/renderer.h"
 
 #include "core/error.h"
+#include "core/seconds.h"
 #include "transport/renderer.h"
 
 #include <algorithm>
@@ -55,7 +56,7 @@ double Renderer::measured(const Stage& stage) const {
     const auto start = std::chrono::steady_clock::now();
     stage();
     gl_.Finish();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return seconds_since(start);
 }
 
 void Renderer::set_light(const Spotlight& light, std::shared_ptr<const DisplayField> field) {

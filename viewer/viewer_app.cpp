@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/progress.h"
+#include "core/seconds.h"
 #include "viewer/camera_control.h"
 #include "viewer/light_control.h"
 
@@ -10,7 +11,6 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -22,10 +22,6 @@ constexpr double most_patch_seconds = 0.03; // of a picture, so that it stays sm
 constexpr std::size_t fewest_new = 200, most_at_once = 1'000'000;
 constexpr std::size_t history = 200;
 constexpr float grab_radius = 14.0f; // pixels about the light's mark
-
-double now() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 void remember(std::vector<float>& values, double seconds) {
     values.push_back(static_cast<float>(1e3 * seconds));
@@ -61,7 +57,7 @@ void ViewerApp::open(const std::string& path) {
     attempt([&] { // the window stays with what it has
         auto opened = std::make_unique<Session>(window_.gl(), path, session_ ? "" : options_.scene,
                                                 session_ ? session_->renderer.method() : options_.method);
-        if (!session_ && !path_.empty()) playing_since_ = now();
+        if (!session_ && !path_.empty()) playing_since_ = clock_seconds();
         session_ = std::move(opened);
         message_ = "opened " + path;
         window_.set_title("Afterglow - " + std::filesystem::path(path).filename().string());
@@ -120,7 +116,7 @@ void ViewerApp::on_key(int key) {
         if (playing_since_)
             playing_since_.reset();
         else if (!path_.empty() && !recording_since_)
-            playing_since_ = now();
+            playing_since_ = clock_seconds();
         break;
     case GLFW_KEY_O: overlay_ = static_cast<Overlay>((static_cast<int>(overlay_) + 1) % 4); break;
     case GLFW_KEY_UP: overlay_level_ = std::min(overlay_level_ + 1, levels - 1); break;
@@ -218,7 +214,7 @@ void ViewerApp::fly_with_keys(double seconds) {
 
 void ViewerApp::toggle_recording() {
     if (!recording_since_) {
-        recording_since_ = now();
+        recording_since_ = clock_seconds();
         playing_since_.reset();
         path_.clear();
         message_ = "recording";
@@ -232,12 +228,12 @@ void ViewerApp::toggle_recording() {
 
 void ViewerApp::record() {
     if (recording_since_)
-        path_.push_back({now() - *recording_since_, session_->camera, session_->light});
+        path_.push_back({clock_seconds() - *recording_since_, session_->camera, session_->light});
 }
 
 void ViewerApp::play() {
     if (!playing_since_) return;
-    const double time = path_.front().time + now() - *playing_since_;
+    const double time = path_.front().time + clock_seconds() - *playing_since_;
     const Frame frame = frame_at(path_, time);
     const int width = session_->camera.width, height = session_->camera.height;
     session_->camera = frame.camera;
@@ -300,7 +296,7 @@ void ViewerApp::draw_picture() {
 }
 
 void ViewerApp::step() {
-    const double time = now(), seconds = time - last_time_;
+    const double time = clock_seconds(), seconds = time - last_time_;
     last_time_ = time;
     if (precompute_ && precompute_->state() != PrecomputeTask::State::at_work) {
         if (precompute_->state() == PrecomputeTask::State::done)
@@ -366,7 +362,7 @@ void ViewerApp::draw_window() {
 }
 
 void ViewerApp::run() {
-    last_time_ = now();
+    last_time_ = clock_seconds();
     while (!window_.should_close()) {
         const bool moves = picture_is_old_ || playing_since_ || recording_since_
                            || (session_ && session_->light_thread.is_busy());

@@ -3,12 +3,14 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "tests/support/quad.h"
+#include "tests/support/surface_samples.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 
 namespace afterglow {
 namespace {
@@ -112,6 +114,20 @@ TEST(CandidateSource, DoesNotDependOnThreadsOrTheStepsItIsMadeIn) {
         ASSERT_EQ((*one)[i].at.position, (*two)[i].at.position);
         ASSERT_EQ((*one)[i].at.normal, (*two)[i].at.normal);
     }
+}
+
+TEST(CandidateSource, IsPatientWhereLittleIsReached) {
+    // In the open, beside the only thing on a wide ground: of thousands of particles few leave candidates.
+    Scene scene = make_ground(20.0f);
+    for (const auto& [u, v] : {std::pair<Vec3, Vec3>{Vec3::UnitY(), Vec3::UnitZ()}, {Vec3::UnitX(), Vec3::UnitY()}})
+        add_quad(scene, {Vec3(0, 0, 0), u, u + v, v});
+    const Surface surface(scene);
+    CandidateSource source(surface, {Vec3(-3, 1.7f, -3)}, 1);
+    source.ensure(1);
+    const std::size_t first = source.size();
+    EXPECT_LT(first, 20u);
+    source.ensure(first + 100);
+    EXPECT_GE(source.size(), first + 100);
 }
 
 TEST(CandidateSource, RefusesAViewpointFromWhichNoSurfaceIsReached) {

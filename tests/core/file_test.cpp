@@ -116,6 +116,15 @@ TEST(WriteAtomically, WritesToWhatTheProcessHasOpen) {
     EXPECT_EQ(folder.count(), 2u);
 }
 
+TEST(WriteAtomically, LeavesAFileToThoseWhoMayReadIt) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("private.txt", "old");
+    namespace fs = std::filesystem;
+    fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write);
+    write_text(path, "new");
+    EXPECT_EQ(fs::status(path).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
 TEST(WriteAtomically, RefusesAFolderAndAMissingFolder) {
     const TemporaryFolder folder;
     EXPECT_THROW(write_text(folder.path(""), "text"), FileError);

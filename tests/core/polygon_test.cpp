@@ -100,6 +100,21 @@ TEST(Triangulate, FillsRandomStars) {
     }
 }
 
+TEST(Triangulate, FillsASpiralOfThousandsOfCorners) {
+    for (const int turns : {3, 6}) {
+        constexpr int steps = 1500;
+        Polygon spiral;
+        const auto at = [&](int k, float radius) {
+            const float angle = static_cast<float>(2.0 * EIGEN_PI * turns * k / steps);
+            return Vec3(radius * std::cos(angle), radius * std::sin(angle), 0.0f);
+        };
+        const auto radius = [&](int k) { return 1.0f + static_cast<float>(turns * k) / steps; };
+        for (int k = 0; k < steps; ++k) spiral.push_back(at(k, radius(k) + 0.5f));
+        for (int k = steps; k-- > 0;) spiral.push_back(at(k, radius(k)));
+        expect_partition(spiral);
+    }
+}
+
 TEST(Triangulate, CutsAQuadrilateralAlongItsShorterDiagonal) {
     std::vector<std::array<std::uint32_t, 3>> triangles;
     triangulate(Polygon{{-3, 0, 0}, {0, -1, 0}, {3, 0, 0}, {0, 1, 0}}, triangles);

@@ -1,5 +1,6 @@
 #include "core/builtin_scenes.h"
 #include "core/sampling.h"
+#include "tests/support/quad.h"
 #include "transport/patches.h"
 
 #include <gtest/gtest.h>
@@ -111,6 +112,29 @@ TEST(PatchGrid, CutsTheGroundFinelyWhereItIsUsedHoweverFarItReaches) {
             outside.u = u;
             ASSERT_LT(grid.patch_of(outside), grid.patch_count());
         }
+    }
+}
+
+TEST(PatchGrid, NeedsFewCellsForATerrainAroundARoom) {
+    // Triangles of 50 m, which alone are not too large for cells of 10 cm each.
+    Scene scene;
+    for (int y = -10; y < 10; ++y)
+        for (int x = -10; x < 10; ++x) {
+            const Vec3 corner(50.0f * static_cast<float>(x), 50.0f * static_cast<float>(y), 0.0f);
+            add_quad(scene, {corner, corner + Vec3(50, 0, 0), corner + Vec3(50, 50, 0), corner + Vec3(0, 50, 0)});
+        }
+    const Eigen::AlignedBox3f used(Vec3(-3, -2, -1), Vec3(2, 3, 1));
+    const PatchGrid grid(scene, 0.1f, used);
+    EXPECT_LT(grid.patch_count(), 2u * (2 * 60 * 60 + 800));
+}
+
+TEST(PatchGrid, KnowsAreasInAnyUnit) {
+    for (const float size : {1e-10f, 1.0f, 1e10f}) {
+        const Scene scene = single_triangle({0, 0, 0}, {size, 0, 0}, {0, size, 0});
+        const PatchGrid grid(scene, 0.3f * size);
+        double sum = 0.0;
+        for (std::uint32_t patch = 0; patch < grid.patch_count(); patch += 2) sum += grid.area(patch);
+        EXPECT_NEAR(sum / (static_cast<double>(size) * size), 0.5, 1e-4) << size;
     }
 }
 

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -92,6 +93,37 @@ TEST(Verification, TriesWhatAPersonMight) {
     EXPECT_EQ(trial.places.back().position, again.places.back().position);
     EXPECT_EQ(trial.lights.back().position, again.lights.back().position);
     EXPECT_NE(trial.lights.back().position, other.lights.back().position);
+}
+
+TEST(Verification, EachEyeLooksEverywhere) {
+    // Two closed rooms: whichever of the eyes is in one, all of its walls are seen from there.
+    const Scene one = make_builtin_scene("builtin:furnace:0.5");
+    Scene scene = one;
+    const auto corners = static_cast<std::uint32_t>(one.positions.size());
+    for (const Vec3& p : one.positions) scene.positions.push_back(p + Vec3(10, 0, 0));
+    for (const Triangle& t : one.triangles) scene.triangles.push_back({t[0] + corners, t[1] + corners, t[2] + corners});
+    scene.material_index.resize(scene.triangles.size(), 0);
+    const Surface surface(scene);
+    for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6, 7, 8}) {
+        const Trial trial = random_trial(surface, {Vec3::Zero(), Vec3(10, 0, 0)}, 1, 1000, seed);
+        std::array<std::array<int, 6>, 2> seen{};
+        std::array<int, 2> all{}, first{};
+        for (std::size_t k = 0; k < trial.places.size(); ++k) {
+            const SurfacePoint& x = trial.places[k];
+            const std::size_t room = x.position.x() > 5.0f;
+            int axis = 0;
+            const float side = x.normal[(x.normal.cwiseAbs().maxCoeff(&axis), axis)];
+            ++seen[room][static_cast<std::size_t>(2 * axis + (side > 0.0f))];
+            ++all[room];
+            first[room] += k % 2 == 0;
+        }
+        for (std::size_t room = 0; room < 2; ++room) {
+            if (all[room] == 0) continue;
+            for (const int n : seen[room]) EXPECT_GT(n, 0.02 * all[room]) << "seed " << seed;
+            // Every second place comes from either eye: their order is none.
+            EXPECT_NEAR(first[room], 0.5 * all[room], 5.0 * std::sqrt(0.25 * all[room])) << "seed " << seed;
+        }
+    }
 }
 
 /// A box whose walls reflect a half.
