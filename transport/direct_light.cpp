@@ -244,15 +244,18 @@ void DirectLight::keep_seen(const SurfacePoint& y, std::vector<BasisEntry>& row)
     constexpr std::size_t most = 4;
     thread_local std::vector<std::uint32_t> near;
     nearest().closest(y.position, looked_at, near);
-    std::erase_if(near, [&](std::uint32_t k) {
-        const SurfacePoint other = points_.point(begin + k);
-        return !(areas_[k] > 0.0f) || other.normal.dot(y.normal) <= 0.5f
-               || surface_.blocked(surface_.lifted(y), surface_.lifted(other));
-    });
-    near.resize(std::min(near.size(), most));
+    const std::size_t own = row.size();
     float area = 0.0f;
-    for (const std::uint32_t k : near) area += areas_[k];
-    for (const std::uint32_t k : near) row.push_back({begin + k, on_edge * areas_[k] / area});
+    for (const std::uint32_t k : near) {
+        if (row.size() == own + most) break;
+        const SurfacePoint other = points_.point(begin + k);
+        if (!(areas_[k] > 0.0f) || other.normal.dot(y.normal) <= 0.5f
+            || surface_.blocked(surface_.lifted(y), surface_.lifted(other)))
+            continue;
+        area += areas_[k];
+        row.push_back({begin + k, on_edge * areas_[k]});
+    }
+    for (BasisEntry& added : std::span(row).subspan(own)) added.value /= area;
 }
 
 void DirectLight::splat(const Spotlight& light, std::span<float> result) const {
