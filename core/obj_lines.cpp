@@ -82,7 +82,8 @@ ObjLines::ObjLines(std::string_view text) : rest_(text) {
 }
 
 std::string_view ObjLines::take_line() {
-    std::size_t length = std::min(rest_.find_first_of("\r\n"), rest_.size());
+    std::size_t length = 0; // find_first_of() would call a function for each character
+    while (length < rest_.size() && rest_[length] != '\n' && rest_[length] != '\r') ++length;
     length = std::min(length + (rest_.substr(length, 2) == "\r\n" ? 2 : 1), rest_.size());
     const std::string_view line = rest_.substr(0, length);
     rest_.remove_prefix(length);

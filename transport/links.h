@@ -14,7 +14,8 @@ namespace afterglow {
 struct LinkOptions {
     /// A power of two. A receiver on level l casts R_l / R_L times as many, R_L: the display level's spacing,
     /// as its links must be less noisy where its threshold is lower; of few rays (R_l / R_L)^1.5 times as
-    /// many until there are 512 R_l / R_L. Rounded down to a power of two, and never more than most_rays, or than `rays` where these are more.
+    /// many until there are 512 R_l / R_L. Rounded down to a power of two, and never more than most_rays,
+    /// or than `rays` where these are more.
     /// On the display level itself 3 / (2 threshold) of 512 suffice, 32 at least, rounded up to a power of two
     /// (usually 256): of so many, three add a link on its threshold. Of more or fewer rays the same share, but
     /// not fewer than these.
