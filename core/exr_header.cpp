@@ -18,7 +18,7 @@ constexpr std::uint8_t dwab = 9;               // the compression that takes mos
 
 // What a header may ask for at most. Black compresses best: a byte of the file stands for some hundred
 // pixels of ours, for two thousand of a lossy method's.
-constexpr std::int64_t most_pixels = std::int64_t{1} << 27, longest_side = 1 << 16;
+constexpr std::int64_t longest_side = 1 << 16;
 constexpr std::int64_t most_pixels_per_byte = 4096;
 
 struct FixedType {
@@ -133,24 +133,20 @@ bool read_attribute(const std::string& path, Bytes& header, Part& part) {
     return true;
 }
 
-void check_part(const std::string& path, const Part& part, std::size_t file_bytes) {
+void check_size(const std::string& path, const Part& part, std::size_t file_bytes) {
     const auto is_side = [](std::int64_t length) { return length >= 0 && length <= longest_side; };
     const bool has_sides = part.width > 0 && part.height > 0 && is_side(part.width) && is_side(part.height)
                            && is_side(part.tile_width) && is_side(part.tile_height);
-    // Buffers are as wide as the picture and as high as what is compressed at a time, or as a tile.
+    const std::int64_t most = std::min(most_exr_pixels, most_pixels_per_byte * static_cast<std::int64_t>(file_bytes));
+    // The picture itself is of three channels, and so is a row of tiles. Of all channels are buffers, as wide as the
+    // picture and as high as what is compressed at a time, or as a tile.
     const std::int64_t lines = part.compression == dwab ? 256 : 32;
-    const auto fits = [&](std::int64_t width, std::int64_t height) {
-        const auto bytes = static_cast<std::int64_t>(file_bytes);
-        return width * height <= 3 * std::min(most_pixels, most_pixels_per_byte * bytes)
-                                     / std::max<std::int64_t>(part.channels, 3);
-    };
-    if (!has_sides || !fits(part.width, std::max(part.height, lines))
-        || !fits(part.tile_width, part.tile_height))
+    const std::int64_t most_for_all = 3 * most / std::max<std::int64_t>(part.channels, 3);
+    if (!has_sides || part.width * std::max(part.height, part.tile_height) > most || part.width * lines > most_for_all
+        || part.tile_width * part.tile_height > most_for_all)
         throw FileError(path, "has an impossible size of " + std::to_string(part.width) + "x"
                                   + std::to_string(part.height) + " pixels, or of its tiles, for "
                                   + std::to_string(file_bytes) + " bytes; write it again");
-    if (!part.red || !part.green || !part.blue)
-        throw FileError(path, "has not R, G and B as full-size channels, which are needed");
 }
 
 } // namespace
@@ -159,12 +155,14 @@ void check_exr_header(const std::string& path, std::span<const std::byte> file) 
     Bytes rest(path, {reinterpret_cast<const char*>(file.data()), file.size()});
     if (file.size() < 8 || rest.take(4) != magic) throw FileError(path, "is no OpenEXR file");
     const bool more = (rest.number<std::int32_t>() & several_parts) != 0;
-    do {
+    for (bool is_first = true; is_first || (more && rest.next() != '\0'); is_first = false) {
         Part part;
         while (read_attribute(path, rest, part)) {
         }
-        check_part(path, part, file.size());
-    } while (more && rest.next() != '\0');
+        check_size(path, part, file.size());
+        if (is_first && !(part.red && part.green && part.blue))
+            throw FileError(path, "has not R, G and B as full-size channels, which are needed");
+    }
 }
 
 } // namespace afterglow

@@ -12,6 +12,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <new>
 #include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -207,11 +208,14 @@ MappedFile::MappedFile(const std::string& path) {
     const Descriptor file(path,
                           O_RDONLY | O_NONBLOCK); // opening a pipe must not wait for its writer
     struct stat status {};
+    // No fault of the file, which might else be left out and passed over.
+    if (!file && (errno == EMFILE || errno == ENFILE)) throw Error("too many files are open to read " + path);
     if (!file || ::fstat(file, &status) != 0) throw FileError(path, "cannot be read: " + reason());
     if (!S_ISREG(status.st_mode)) throw FileError(path, "is not a regular file");
     size_ = static_cast<std::size_t>(status.st_size);
     if (size_ == 0) return; // nothing to map
     void* data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file, 0);
+    if (data == MAP_FAILED && errno == ENOMEM) throw std::bad_alloc();
     if (data == MAP_FAILED) throw FileError(path, "cannot be mapped into memory: " + reason());
     data_ = static_cast<const std::byte*>(data);
 }

@@ -15,17 +15,31 @@
 #include <ImfOutputFile.h>
 #include <ImfStdIO.h>
 #include <ImfStringAttribute.h>
-#include <stb_image_write.h>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <half.h>
-#include <limits>
 #include <new>
 #include <span>
+
+// Built here rather than taken from the shared library, which ends the process where memory is short.
+namespace {
+void* checked(void* memory) {
+    if (!memory) throw std::bad_alloc();
+    return memory;
+}
+} // namespace
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#define STB_IMAGE_WRITE_STATIC
+#define STBI_WRITE_NO_STDIO
+#define STBIW_MALLOC(size) checked(std::malloc(size))
+#define STBIW_REALLOC(memory, size) checked(std::realloc(memory, size))
+#define STBIW_FREE std::free
+#include <stb_image_write.h>
 
 namespace afterglow {
 namespace {
@@ -141,12 +155,15 @@ std::string encode_png(const Image& image, std::optional<float> key) {
 } // namespace
 
 void check_picture(const std::string& path, int width, int height) {
-    if (path.ends_with(".exr")) return;
-    if (!path.ends_with(".png")) throw UsageError(path + ": a picture's name must end in .exr or .png");
-    // stb_image_write counts the bytes, three a pixel and one a line, in an int.
-    if ((3 * static_cast<std::int64_t>(width) + 1) * height > std::numeric_limits<int>::max())
-        throw UsageError(path + ": a PNG picture of " + std::to_string(width) + "x" + std::to_string(height)
-                         + " is too large; write .exr, or fewer than 700 million pixels");
+    const bool is_exr = path.ends_with(".exr");
+    if (!is_exr && !path.ends_with(".png")) throw UsageError(path + ": a picture's name must end in .exr or .png");
+    // Of EXR, what read_exr() takes. Of PNG, stb_image_write counts bytes in an int, doubles what it writes into, up to
+    // 3 * 2^29, and needs at most nine bits a byte, of which there are three a pixel and one a line.
+    constexpr std::int64_t most_png_bytes = 1'400'000'000;
+    const auto w = static_cast<std::int64_t>(width);
+    if (is_exr ? w * height > most_exr_pixels : (3 * w + 1) * height > most_png_bytes)
+        throw UsageError(path + ": a picture of " + std::to_string(width) + "x" + std::to_string(height)
+                         + " is too large; at most " + (is_exr ? "134 million pixels as .exr" : "460 million as .png"));
 }
 
 void write_image(const std::string& path, const Image& image, PixelType type,

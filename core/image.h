@@ -29,11 +29,12 @@ enum class PixelType { half_float, full_float };
 /// Writes by the extension: .exr (linear, channels R, G, B, string attributes) or .png (tone mapped:
 /// Reinhard et al. 2002, global operator at the given exposure key, then sRGB; without a key, values
 /// from 0 to 1 are shown as they are). The file appears whole or not at all. Throws FileError;
-/// UsageError for another extension, or a PNG file of 2^31 bytes or more before it is compressed.
+/// UsageError for another extension, or a picture that is too large (check_picture()).
 void write_image(const std::string& path, const Image& image, PixelType type,
                  std::optional<float> exposure = 0.18f);
 
-/// Throws UsageError where write_image() would.
+/// Throws UsageError where write_image() would: for another extension, for more than 2^27 pixels as .exr, which
+/// read_exr() would refuse, and for more than 1.4e9 bytes (about 460 million pixels) as .png.
 void check_picture(const std::string& path, int width, int height);
 
 /// Writes a PNG file of bytes as they are, R, G, B each, rows from the top. Throws FileError.

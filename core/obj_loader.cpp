@@ -339,7 +339,9 @@ private:
         }
     }
 
-    void add_triangle(const std::array<Corner, 3>& c, int material) {
+    void add_triangle(std::array<Corner, 3> c, int material) {
+        // Normals, where there are any, say which side is which: what was mirrored has them the other way round.
+        if (is_wound_against_normals(c)) std::swap(c[1], c[2]);
         scene_.triangles.push_back({c[0].position, c[1].position, c[2].position});
         scene_.material_index.push_back(material_of(material));
         if (!raw_.normals.empty()) {
@@ -351,6 +353,18 @@ private:
         if (!raw_.texture_coordinates.empty())
             scene_.texture_indices.push_back(
                 moved(complete({c[0].texture, c[1].texture, c[2].texture}, texture_usable_), material));
+    }
+
+    bool is_wound_against_normals(const std::array<Corner, 3>& c) const {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (const Corner& corner : c) {
+            if (corner.normal == no_index || is_bad(corner.normal, normal_usable_)) return false;
+            sum += raw_.normals[corner.normal].template cast<double>();
+        }
+        const auto position = [&](int k) -> Eigen::Vector3d {
+            return raw_.positions[c[static_cast<std::size_t>(k)].position].template cast<double>();
+        };
+        return sum.dot((position(1) - position(0)).cross(position(2) - position(0))) < 0.0;
     }
 
     /// Texture coordinates as a material scales and shifts them (-s, -o), which are new ones.

@@ -41,7 +41,7 @@ private:
 /// that every aligned block of 2^k points is stratified on each of its elementary intervals.
 std::array<std::uint32_t, 2> sobol2(std::uint32_t index);
 
-/// Owen scrambling of one coordinate by hashing (Laine and Karras 2011, constants of Burley 2020).
+/// Owen scrambling of one coordinate by hashing (Laine and Karras 2011, constants of Vegdahl 2021).
 std::uint32_t owen_scramble(std::uint32_t bits, std::uint32_t seed);
 
 /// The index-th point of an Owen-scrambled (0,2)-sequence in [0,1)^2; one sequence a seed.

@@ -9,13 +9,23 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <memory>
+#include <new>
 #include <string_view>
 
 // Built here rather than taken from the shared library: the readers of other formats follow null pointers
 // or read behind their buffers where a file is damaged, and those that are read use tables which the file never
 // filled, of colours and codes. Of zeros, the same file gives the same picture; on the stack the compiler makes
-// them (CMakeLists.txt).
+// them (CMakeLists.txt). Want of memory it takes for a damaged file.
+namespace {
+thread_local bool lacked_memory = false;
+
+void* noted(void* memory) {
+    if (!memory) lacked_memory = true;
+    return memory;
+}
+} // namespace
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_ONLY_BMP
@@ -23,8 +33,8 @@
 #define STBI_ONLY_PNG
 #define STBI_ONLY_TGA
 #define STBI_NO_STDIO
-#define STBI_MALLOC(size) std::calloc(size, 1)
-#define STBI_REALLOC std::realloc
+#define STBI_MALLOC(size) noted(std::calloc(size, 1))
+#define STBI_REALLOC(memory, size) noted(std::realloc(memory, size))
 #define STBI_FREE std::free
 #include <stb_image.h>
 
@@ -91,23 +101,46 @@ bool has_sound_tables(std::string_view segment) {
     return true;
 }
 
-/// Likewise of a JPEG file. Up to the first scan, segments are passed over as a whole; behind it anything
-/// may follow that looks like a table.
-bool has_sound_jpeg_tables(std::string_view file) {
-    constexpr char huffman_tables = '\xc4', scan = '\xda';
+/// Calls visit(marker, what follows it) for each marker of a JPEG file, until it returns false. Up to the first
+/// scan, segments are passed over as a whole; behind it, all that looks like a marker is taken for one.
+template <class Visit>
+void for_each_marker(std::string_view file, const Visit& visit) {
+    constexpr char scan = '\xda';
     bool in_header = true;
-    for (std::size_t at = 2; at + 4 <= file.size();) {
+    for (std::size_t at = 2; at + 2 <= file.size();) {
         const char marker = file[at + 1];
         if (file[at] != '\xff' || marker == '\xff' || marker == '\0') {
             ++at;
             continue;
         }
         const std::string_view segment = file.substr(at + 2);
-        if (marker == huffman_tables && !has_sound_tables(segment)) return false;
         in_header = in_header && marker != scan;
+        if (!visit(marker, segment, in_header)) return;
         at += in_header ? 2 + big_endian(segment, 2) : 1;
     }
-    return true;
+}
+
+/// Likewise of a JPEG file.
+bool has_sound_jpeg_tables(std::string_view file) {
+    constexpr char huffman_tables = '\xc4';
+    bool is_sound = true;
+    for_each_marker(file, [&](char marker, std::string_view segment, bool) {
+        is_sound = marker != huffman_tables || has_sound_tables(segment);
+        return is_sound;
+    });
+    return is_sound;
+}
+
+/// A JPEG file without what cameras put behind its picture.
+std::string_view picture_alone(std::string_view file) {
+    constexpr char end = '\xd9';
+    std::size_t size = file.size();
+    for_each_marker(file, [&](char marker, std::string_view segment, bool in_header) {
+        if (in_header || marker != end) return true;
+        size -= segment.size();
+        return false;
+    });
+    return file.substr(0, size);
 }
 
 /// False where a BMP file of few colours has no table of them.
@@ -131,17 +164,22 @@ bool has_colour_table(std::string_view file) {
 Texture read_picture(const std::string& path, const std::array<float, 256>& value) {
     const MappedFile file(path);
     const auto bytes = file.bytes();
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (text.starts_with(jpeg)) text = picture_alone(text);
     if ((text.starts_with(png) && !has_whole_chunks(text))
         || (text.starts_with(jpeg) && !has_sound_jpeg_tables(text)) || text.starts_with(filled_jpeg)
         || (text.starts_with(bmp) && !has_colour_table(text)))
         throw FileError(path, "is damaged or cut short");
     const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
-    const int size = bytes.size() <= most_bytes ? static_cast<int>(bytes.size()) : 0;
+    const int size = text.size() <= most_bytes ? static_cast<int>(text.size()) : 0;
     Texture texture;
     int channels = 0;
-    if (!stbi_info_from_memory(data, size, &texture.width, &texture.height, &channels)
-        || texture.width < 1 || texture.height < 1)
+    lacked_memory = false;
+    const bool is_known = stbi_info_from_memory(data, size, &texture.width, &texture.height, &channels) != 0;
+    if (lacked_memory) throw std::bad_alloc();
+    if (text.starts_with(bmp) && texture.height < 0 && texture.height > std::numeric_limits<int>::min())
+        texture.height = -texture.height; // rows from the top
+    if (!is_known || texture.width < 1 || texture.height < 1)
         throw FileError(path, "is no picture in PNG, JPEG, TGA or BMP");
     const std::uint64_t count =
         static_cast<std::uint64_t>(texture.width) * static_cast<std::uint64_t>(texture.height);
@@ -152,6 +190,7 @@ Texture read_picture(const std::string& path, const std::array<float, 256>& valu
     const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
         stbi_load_from_memory(data, size, &texture.width, &texture.height, &channels, 3),
         stbi_image_free);
+    if (lacked_memory) throw std::bad_alloc();
     if (!texels) throw FileError(path, "is damaged");
 
     const std::size_t row = 3 * static_cast<std::size_t>(texture.width);

@@ -34,7 +34,8 @@ ToneMap::ToneMap(const Image& image, float key) {
     white = std::max(1.0f, scale * all.largest);
 }
 
-Rgb ToneMap::operator()(const Rgb& c) const {
+Rgb ToneMap::operator()(const Rgb& colour) const {
+    const Rgb c = (colour > 1e30f).select(Rgb::Constant(1e30f), colour); // also of what is infinite, products are finite
     const float l = std::max(0.0f, scale * luminance(c));
     return c * scale * (1.0f + l / (white * white)) / (1.0f + l);
 }

@@ -101,10 +101,12 @@ void add_light_options(CLI::App& command, Spotlight& light) {
         ->group("Light");
 }
 
-void add_camera_options(CLI::App& command, Camera& camera) {
+void add_camera_options(CLI::App& command, Camera& camera, bool required) {
     add_vector(command, "--camera-position", camera.position, "Position of the camera")
+        ->required(required)
         ->group("Camera");
     add_vector(command, "--camera-target", camera.target, "Point in the middle of the picture")
+        ->required(required)
         ->group("Camera");
     add_vector(command, "--camera-up", camera.up,
                "Direction that is up in the picture (default 0,1,0)")

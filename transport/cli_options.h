@@ -25,9 +25,9 @@ CLI::Option* add_number(CLI::App& command, const std::string& option, double& va
 /// runs light.check() when all is parsed.
 void add_light_options(CLI::App& command, Spotlight& light);
 
-/// --camera-position, --camera-target, --camera-up, --camera-fov, --size. The caller sees by
-/// camera_was_given() whether the first two are there and runs camera.check().
-void add_camera_options(CLI::App& command, Camera& camera);
+/// --camera-position, --camera-target, --camera-up, --camera-fov, --size. The caller runs camera.check(); where
+/// the first two are not required, camera_was_given() tells whether they are there.
+void add_camera_options(CLI::App& command, Camera& camera, bool required);
 /// --size alone.
 void add_size_option(CLI::App& command, Camera& camera);
 bool camera_was_given(const CLI::App& command);

@@ -244,7 +244,7 @@ void print_tuning(const PrecomputeCommand& command, const TuningReport& tuning) 
         case TuningEnd::most_seconds: reason = "a finer step would exceed --max-time"; break;
         case TuningEnd::most_bytes: reason = "a finer step would exceed --max-memory"; break;
         case TuningEnd::nothing_to_compare: reason = "there is no indirect light to compare with"; break;
-        case TuningEnd::finest: reason = "finer functions would not help"; break;
+        case TuningEnd::finest: reason = "neither the finest spacing nor five steps would do"; break;
     }
     if (reason)
         std::fprintf(stderr, "afterglow: warning: the target error of %.3g %% was not reached: %s\n",
@@ -404,7 +404,8 @@ void add_precompute_command(CLI::App& app) {
     add_number(*sub, "--max-memory", command->max_memory, "Gigabytes that it may take");
     sub->add_flag("--draft", command->draft, "A preview in seconds: wide spacing, few rays, not verified");
     add_number(*sub, "--epsilon", command->epsilon,
-               "Instead: links below this size are dropped (default of --operator paper: 0.025/pi)")
+               "Instead: links below this are dropped, weighted by the spacings at both ends; of --operator paper "
+               "by their size alone (default there 0.025/pi)")
         ->excludes(target_error);
     sub->add_option("--operator", command->operator_name,
                     "neumann: one bounce, repeated at run time (default); paper: several bounces, "

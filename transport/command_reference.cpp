@@ -159,7 +159,7 @@ void add_reference_command(CLI::App& app) {
         ->type_name("plain|connected");
     sub->add_option("--report", command->report, "JSON file for samples, rays, time and error")->type_name("FILE");
     add_light_options(*sub, command->light);
-    add_camera_options(*sub, command->camera);
+    add_camera_options(*sub, command->camera, false); // --points in their place
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);
     sub->callback([sub, command] {

@@ -103,11 +103,9 @@ void add_render_command(CLI::App& app) {
                "Key of the tone map, for .png alone (default 0.18)");
     sub->add_option("--scene", command->scene, "Where the scene is now")->type_name("SCENE");
     add_light_options(*sub, command->light);
-    add_camera_options(*sub, command->camera);
+    add_camera_options(*sub, command->camera, true);
     add_run_options(*sub, command->run);
-    sub->callback([sub, command] {
-        if (!camera_was_given(*sub))
-            throw UsageError("render needs --camera-position and --camera-target");
+    sub->callback([command] {
         if (!(command->exposure > 0.0)) throw UsageError("--exposure must be positive");
         run(*command);
     });

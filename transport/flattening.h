@@ -8,7 +8,7 @@
 namespace afterglow {
 
 /// The paper's operator gives coefficients on every level, of a field that is the sum of all levels
-/// [LZT08, eq. (6)]. Flattened [LZT08, sec. 4.2], the last level's entries hold the field's values at
+/// [LZT08, eq. (6)]. Flattened [LZT08, sec. 4.1], the last level's entries hold the field's values at
 /// its points, so that this level alone is read. What the coarser levels do between these points is
 /// lost.
 class Flattening {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <type_traits>
 
 namespace afterglow {
 namespace {
@@ -15,29 +16,42 @@ namespace {
 constexpr int most_channels = 3, most_products = 60;
 using PerChannel = Eigen::Array<double, most_channels, 1>;
 
+/// Calls function(std::integral_constant<int, channels>()): loops over channels whose number is known are not loops.
+template <class Function>
+auto with_channels(int channels, const Function& function) {
+    switch (channels) {
+        case 1: return function(std::integral_constant<int, 1>());
+        case 2: return function(std::integral_constant<int, 2>());
+        default: return function(std::integral_constant<int, 3>());
+    }
+}
+
 PerChannel dot(const std::vector<float>& a, const std::vector<float>& b, int channels) {
-    const auto count = static_cast<Index>(a.size()) / channels;
-    return parallel_sum<PerChannel>(
-        count, PerChannel::Zero(),
-        [&](Index i) {
-            PerChannel product = PerChannel::Zero();
-            for (int c = 0; c < channels; ++c)
-                product[c] = static_cast<double>(a[i * channels + c]) * b[i * channels + c];
-            return product;
-        },
-        4096);
+    return with_channels(channels, [&](auto fixed) {
+        constexpr Index n = fixed;
+        return parallel_sum<PerChannel>(
+            static_cast<Index>(a.size()) / n, PerChannel::Zero(),
+            [&a, &b](Index i) {
+                PerChannel product = PerChannel::Zero();
+                for (Index c = 0; c < n; ++c) product[c] = static_cast<double>(a[i * n + c]) * b[i * n + c];
+                return product;
+            },
+            4096);
+    });
 }
 
 /// y += factor_c x, channel by channel.
 void add(std::vector<float>& y, const PerChannel& factor, const std::vector<float>& x, int channels) {
-    const auto count = static_cast<Index>(y.size()) / channels;
-    parallel_for(
-        count,
-        [&](Index i) {
-            for (int c = 0; c < channels; ++c)
-                y[i * channels + c] += static_cast<float>(factor[c]) * x[i * channels + c];
-        },
-        4096);
+    const Eigen::Array<float, most_channels, 1> f = factor.cast<float>();
+    with_channels(channels, [&](auto fixed) {
+        constexpr Index n = fixed;
+        parallel_ranges(static_cast<Index>(y.size()) / n, 4096, [&y, &x, f](Index begin, Index end) {
+            float* const to = y.data();
+            const float* const from = x.data();
+            for (Index i = begin; i < end; ++i)
+                for (Index c = 0; c < n; ++c) to[i * n + c] += f[c] * from[i * n + c];
+        });
+    });
 }
 
 /// 1 / x where x is not zero.

@@ -21,6 +21,9 @@ inline Eigen::Array4f net_irradiance(const float* product, const Vec3& n) {
 /// Sum of link times coefficient over a row. `coefficients`: four floats (R, G, B, 0) a sender.
 LinkProduct multiply_row(const Links& links, Index row, const float* coefficients);
 
+/// True where the senders of a row rise and are below `senders`.
+bool is_sound_row(const Links& links, Index row, std::uint32_t senders);
+
 /// A link of a column: the receiver within a block of 2^13, then from bit 13 on what bits 7 to 23 of a
 /// PackedLink are: exponent, x, y and z.
 struct ColumnLink {

@@ -19,7 +19,8 @@ const afterglow::ManualText manual = {
         "light and from any viewpoint: precompute makes the transfer file of a scene, render and query take the "
         "light from it. reference, compare and chart say how far the result is from the truth.\n\n"
         "Results go to standard output or to the files named, progress and errors to standard error. Files appear "
-        "whole or not at all. The same input, options and seed give the same bytes on any number of threads.",
+        "whole or not at all. The same input, options and seed give the same bytes on any number of threads, but where "
+        "--max-time or --max-memory decides.",
     .see_also = "afterglow-view(1)"};
 
 } // namespace

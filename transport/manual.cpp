@@ -196,7 +196,8 @@ std::string man_page(const CLI::App& app, const ManualText& text) {
     page += ".SH ENVIRONMENT\n.TP\n" + bold("AFTERGLOW_PORTABLE")
             + "\nIf 1, the program keeps to the instructions of every processor of its kind. Otherwise those with AVX2 "
               "run one that is compiled for them; the two differ in rounding.\n";
-    page += ".SH EXIT STATUS\n0 when done, 1 after a failure (told in one line), 2 for wrong usage.\n";
+    page += ".SH EXIT STATUS\n0 when done, 1 after a failure (told in one line), 2 for wrong usage, 128 and its number "
+            "where a signal ended it (130: Ctrl-C).\n";
     if (!text.see_also.empty()) page += ".SH SEE ALSO\n" + roff(text.see_also) + "\n";
     return page;
 }

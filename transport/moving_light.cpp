@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 
@@ -16,6 +17,31 @@ constexpr double most_links = 0.5;
 constexpr double waiting_share = 0.7;
 /// What a round passed on counts for so much one later.
 constexpr double forgetting = 0.8;
+/// So many rounds without rest, and the series of rounds does not converge.
+constexpr int most_rounds_without_rest = 64;
+
+/// A link's bits as a DisplayLink has them: the exponent where floats have theirs, x, y and z from bit 0 on.
+std::uint32_t display_bits(std::uint32_t packed) {
+    return std::bit_cast<std::uint32_t>(LinkPacker::step_of(packed >> 7 & 31u)) | packed >> 12;
+}
+
+/// The link, and a lane of anything.
+inline LinkVector vector_of_display_bits(std::uint32_t bits) {
+    constexpr std::uint32_t exponent = 0x7f800000;
+#ifdef __AVX2__
+    const __m128i all = _mm_set1_epi32(static_cast<int>(bits));
+    const __m128 step = _mm_castsi128_ps(_mm_and_si128(all, _mm_set1_epi32(exponent)));
+    const __m128i top = _mm_sllv_epi32(all, _mm_setr_epi32(28, 24, 20, 28));
+    LinkVector link;
+    _mm_store_ps(link.data(), _mm_mul_ps(_mm_cvtepi32_ps(_mm_srai_epi32(top, 28)), step));
+    return link;
+#else
+    const auto component = [&](int c) {
+        return static_cast<float>(static_cast<std::int32_t>(bits << (28 - 4 * c)) >> 28);
+    };
+    return std::bit_cast<float>(bits & exponent) * LinkVector(component(0), component(1), component(2), 0.0f);
+#endif
+}
 
 } // namespace
 
@@ -87,7 +113,7 @@ void MovingLight::unpack_display_links() {
     display_links_.resize(display_begin_.back());
     parallel_for(count, [&](Index k) {
         DisplayLink* to = display_links_.data() + display_begin_[static_cast<std::size_t>(k)];
-        transfer.links.for_each_packed(first + k, [&](std::uint32_t sender, std::uint32_t bits) { *to++ = {sender, bits}; });
+        transfer.links.for_each_packed(first + k, [&](std::uint32_t sender, std::uint32_t bits) { *to++ = {sender, display_bits(bits)}; });
     }, 4096);
 }
 
@@ -126,8 +152,11 @@ void MovingLight::push_levels(int levels, const Visit& visit) {
 }
 
 void MovingLight::store(Index i, const Padded& value) {
-    for (std::size_t a = 0; a < 3; ++a)
-        std::copy_n(value[a].data(), 3, &field_[9 * static_cast<std::size_t>(i) + 3 * a]);
+    using Four = Eigen::Map<Eigen::Vector4f>;
+    float* const to = &field_[9 * static_cast<std::size_t>(i)]; // nine numbers: what goes too far is written over
+    Four(to + 0) = value[0];
+    Four(to + 3) = value[1];
+    Four(to + 5) = Eigen::Vector4f(value[1][2], value[2][0], value[2][1], value[2][2]);
 }
 
 /// All levels, the last in one pass with what is asked of it: its norm, and where it is negative.
@@ -151,7 +180,7 @@ void MovingLight::push_display() {
             const Index i = first + k;
             Eigen::Vector4f x = Eigen::Vector4f::Zero(), y = x, z = x;
             for (std::uint64_t e = begins[k]; e < begins[k + 1]; ++e) {
-                const LinkVector link = Links::vector_of(links[e].bits);
+                const LinkVector link = vector_of_display_bits(links[e].bits);
                 const Eigen::Vector4f c = Eigen::Vector4f::Map(coefficients + 4 * std::size_t{links[e].sender});
                 x += link.x() * c;
                 y += link.y() * c;
@@ -320,8 +349,10 @@ double MovingLight::Forecast::made(double effect2, double waiting2) {
 }
 
 void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s, Stopwatch& watch) {
-    if (field_norm_ == 0.0) { // out of the dark there is nothing to follow
+    // Out of the dark there is nothing to follow, nor where all is too bright to compare, or comes to no rest.
+    if (field_norm_ == 0.0 || !std::isfinite(field_norm_) || parts_.empty() || ++rounds_without_rest_ > most_rounds_without_rest) {
         start_anew(direct);
+        rounds_without_rest_ = 0;
         s.links_share += 1.0;
         s.settled = s.anew = true;
         watch.add_to(s.links_seconds);
@@ -334,7 +365,10 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
     forecast_.found(changed.effect2);
     const double settled2 = std::pow(options_.tolerance * field_norm_, 2);
     s.settled = changed.effect2 <= settled2;
-    if (s.settled) return;
+    if (s.settled) {
+        rounds_without_rest_ = 0;
+        return;
+    }
     const double share = static_cast<double>(changed.links) / static_cast<double>(links_);
     s.links_share += share;
     if (share > most_links) {
@@ -344,6 +378,7 @@ void MovingLight::follow_round(const Radiosity& direct, MovingLightStatistics& s
         apply(changed);
         s.settled = forecast_.made(changed.effect2, changed.waiting2) <= settled2;
     }
+    if (s.settled) rounds_without_rest_ = 0;
     watch.add_to(s.links_seconds);
 }
 
@@ -358,6 +393,7 @@ const VectorIrradiance& MovingLight::follow(const Spotlight& light, MovingLightS
         return field_;
     }
     await_parts();
+    if (!light_ || !light_->shines_alike(light) || (light_->intensity != light.intensity).any()) rounds_without_rest_ = 0;
     follow_intensity(light);
     const Radiosity direct = transport_.direct_radiosity(light);
     watch.add_to(s.direct_seconds);

@@ -68,7 +68,7 @@ private:
     std::future<std::vector<Part>> coming_parts_;
     std::uint64_t links_ = 0;                // of all parts
     struct DisplayLink {
-        std::uint32_t sender, bits; // the latter as of a PackedLink
+        std::uint32_t sender, bits; // the latter: the step as a float's, then x, y and z, four bits each from the lowest on
     };
     std::vector<std::uint64_t> display_begin_; // of a display point each, and the end; empty before the first pose
     std::vector<DisplayLink> display_links_;
@@ -96,6 +96,7 @@ private:
     };
     Forecast forecast_;
     double field_norm_ = 0.0; // |field| at the display level
+    int rounds_without_rest_ = 0; // of this pose, maybe in several calls
     std::optional<Spotlight> light_; // of the last pose
 
     /// Of the radiosity that the product and direct light make.

@@ -5,6 +5,7 @@
 #include "core/obj_loader.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "transport/link_products.h"
 #include "transport/safetensors.h"
 #include "transport/sender_rows.h"
 
@@ -266,15 +267,7 @@ private:
         links.entry = {{reinterpret_cast<const PackedLink*>(bytes.data()), entries}, file_.map()};
         parallel_ranges(links.rows(), 1024, [&](Index from, Index to) {
             bool good = true;
-            for (Index row = from; row < to; ++row) {
-                std::int64_t sender = -1;
-                for (const PackedLink& packed : links.row(row)) {
-                    const std::uint32_t step = Links::step_of(Links::bits_of(packed));
-                    good &= step > 0;
-                    sender += step;
-                }
-                good &= sender < static_cast<std::int64_t>(transfer.senders());
-            }
+            for (Index row = from; row < to; ++row) good &= is_sound_row(links, row, transfer.senders());
             if (!good) fail("has a row of links that does not rise or leaves the senders");
         });
     }

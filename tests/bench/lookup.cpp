@@ -1,6 +1,7 @@
 #include "tests/bench/lookup.h"
 
 #include "basis/r_tree.h"
+#include "core/sampling.h"
 #include "core/seconds.h"
 #include "transport/gather.h"
 #include "transport/precompute.h"
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -26,6 +28,7 @@ class HashGrid {
 public:
     HashGrid(const Eigen::Ref<const Eigen::Matrix3Xf>& centers, const Eigen::Ref<const Eigen::VectorXf>& radii, float cell)
         : inverse_cell_(1.0f / cell) {
+        std::unordered_map<std::uint64_t, Range> range_of;
         for (int pass = 0; pass < 2; ++pass) { // counts, then places
             for (Index i = 0; i < radii.size(); ++i) {
                 const std::array<int, 3> low = cell_of(centers.col(i).array() - radii[i]);
@@ -33,7 +36,7 @@ public:
                 for (int x = low[0]; x <= high[0]; ++x)
                     for (int y = low[1]; y <= high[1]; ++y)
                         for (int z = low[2]; z <= high[2]; ++z) {
-                            Range& range = range_[key({x, y, z})];
+                            Range& range = range_of[key({x, y, z})];
                             if (pass == 1) {
                                 const std::uint32_t at = range.begin + range.count;
                                 for (int a = 0; a < 3; ++a) center_[a][at] = centers(a, i);
@@ -44,21 +47,28 @@ public:
             }
             if (pass == 1) break;
             std::uint32_t total = 0;
-            for (auto& [cell_key, range] : range_) {
+            for (auto& [cell_key, range] : range_of) {
                 range.begin = total;
                 total += std::exchange(range.count, 0);
             }
             for (auto& c : center_) c.resize(total);
             radius2_.resize(total);
         }
+        table_.resize(std::bit_ceil(2 * range_of.size()));
+        for (const auto& [cell_key, range] : range_of) {
+            std::size_t at = slot(cell_key);
+            while (table_[at].range.count > 0) at = (at + 1) & (table_.size() - 1);
+            table_[at] = {cell_key, range};
+        }
     }
-    std::size_t bytes() const { return 16 * radius2_.size() + 24 * range_.size(); }
+    std::size_t bytes() const { return 16 * radius2_.size() + sizeof(Entry) * table_.size(); }
 
     template <class Visit>
     void containing(const Vec3& x, const Visit& visit) const {
-        const auto found = range_.find(key(cell_of(x.array())));
-        if (found == range_.end()) return;
-        const Range range = found->second;
+        const std::uint64_t cell = key(cell_of(x.array()));
+        std::size_t at = slot(cell);
+        while (table_[at].range.count > 0 && table_[at].key != cell) at = (at + 1) & (table_.size() - 1);
+        const Range range = table_[at].range; // an empty one where there is no such cell
         for (std::uint32_t k = range.begin; k < range.begin + range.count; ++k) {
             const float dx = x.x() - center_[0][k], dy = x.y() - center_[1][k], dz = x.z() - center_[2][k];
             const float d2 = dx * dx + dy * dy + dz * dz;
@@ -70,8 +80,12 @@ private:
     struct Range {
         std::uint32_t begin = 0, count = 0;
     };
+    struct Entry {
+        std::uint64_t key = 0;
+        Range range;
+    };
     float inverse_cell_;
-    std::unordered_map<std::uint64_t, Range> range_;
+    std::vector<Entry> table_; // by open addressing, half full at most
     std::array<std::vector<float>, 3> center_;
     std::vector<float> radius2_;
 
@@ -84,6 +98,7 @@ private:
         return (static_cast<std::uint64_t>(c[0]) & mask) << 42 | (static_cast<std::uint64_t>(c[1]) & mask) << 21
                | (static_cast<std::uint64_t>(c[2]) & mask);
     }
+    std::size_t slot(std::uint64_t cell) const { return hash64(cell) & (table_.size() - 1); }
 };
 
 /// Nanoseconds of one call at a place, the best of five rounds over all on one thread; `found`: of all places.
@@ -111,8 +126,10 @@ void run_lookup(const std::string& name) {
     const auto centers = points.position.middleCols(begin, count);
     const Eigen::VectorXf radii = points.support.segment(begin, count);
 
-    std::vector<Hit> hits = arrivals(surface, points, 1);
-    hits.resize(std::min<std::size_t>(hits.size(), 1'000'000));
+    // Some of what arrives at each level of receivers, in its order.
+    const std::vector<Hit> all = arrivals(surface, points, 1);
+    std::vector<Hit> hits;
+    for (std::size_t i = 0, stride = all.size() / 1'000'000 + 1; i < all.size(); i += stride) hits.push_back(all[i]);
     std::vector<Vec3> places;
     for (const Hit& hit : hits) places.push_back(surface.point(hit).position);
 
@@ -141,12 +158,13 @@ void run_lookup(const std::string& name) {
     std::vector<BasisEntry> row;
     const double of_basis = nanoseconds(places.size() / 10, found, [&](std::size_t i) {
         row.clear();
-        sender_row(surface, basis, level, hits[i], row);
+        sender_row(surface, basis, level, hits[10 * i], row);
         return static_cast<double>(row.size());
     });
     std::printf("whole row  %7.1f ns, %.2f entries, by the R-tree, with openness, walls and reflectance\n", of_basis,
                 found / static_cast<double>(places.size() / 10));
     SenderRows rows(surface, basis, transfer.sender_levels);
+    rows.see(all);
     std::vector<std::uint32_t> numbers;
     for (const Hit& hit : hits) numbers.push_back(rows.number(hit, level));
     rows.require(numbers);

@@ -1,8 +1,19 @@
 #include "core/error.h"
+#include "core/exr_header.h"
 #include "core/image.h"
 #include "core/sampling.h"
 #include "tests/support/temporary_folder.h"
 
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfOutputPart.h>
+#include <ImfPartType.h>
+#include <ImfStdIO.h>
+#include <ImfTileDescription.h>
+#include <ImfTiledOutputFile.h>
 #include <gtest/gtest.h>
 #include <stb_image.h>
 
@@ -159,7 +170,68 @@ TEST(Png, BearsBlackPicturesAndValuesThatAreNotFinite) {
                  2,
                  3};
     write_image(folder.path("odd.png"), image, PixelType::half_float);
-    EXPECT_EQ(read_png(folder.path("odd.png")).rgb.size(), 12u);
+    const std::vector<unsigned char> odd = read_png(folder.path("odd.png")).rgb;
+    ASSERT_EQ(odd.size(), 12u);
+    EXPECT_EQ(odd[0], 0); // no number
+    EXPECT_EQ(std::vector(odd.begin() + 3, odd.begin() + 9), (std::vector<unsigned char>{255, 0, 0, 0, 0, 0}));
+    EXPECT_GT(odd[11], 128);
+}
+
+TEST(Exr, OfSeveralPartsOnlyTheFirstNeedsColours) {
+    const auto header = [](std::initializer_list<const char*> channels, const char* part) {
+        Imf::Header h(4, 2);
+        for (const char* channel : channels) h.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+        h.setName(part);
+        h.setType(Imf::SCANLINEIMAGE);
+        return h;
+    };
+    const auto write = [](const std::string& path, std::vector<Imf::Header> headers) {
+        std::vector<float> ones(4 * 2, 1.0f);
+        Imf::MultiPartOutputFile file(path.c_str(), headers.data(), static_cast<int>(headers.size()));
+        for (int p = 0; p < file.parts(); ++p) {
+            Imf::FrameBuffer buffer;
+            for (auto c = file.header(p).channels().begin(); c != file.header(p).channels().end(); ++c)
+                buffer.insert(c.name(), Imf::Slice::Make(Imf::FLOAT, ones.data(), file.header(p).dataWindow()));
+            Imf::OutputPart part(file, p);
+            part.setFrameBuffer(buffer);
+            part.writePixels(2);
+        }
+    };
+    const TemporaryFolder folder;
+    write(folder.path("a.exr"), {header({"R", "G", "B"}, "colour"), header({"Z"}, "depth")});
+    EXPECT_EQ(read_exr(folder.path("a.exr")).rgb, std::vector<float>(3 * 4 * 2, 1.0f));
+    write(folder.path("b.exr"), {header({"Z"}, "depth"), header({"R", "G", "B"}, "colour")});
+    EXPECT_THROW(read_exr(folder.path("b.exr")), FileError);
+}
+
+TEST(Exr, MayHaveManyChannelsButNotTilesHigherThanTheFileHolds) {
+    const auto header_bytes = [](const Imf::Header& header) {
+        Imf::StdOSStream stream;
+        if (header.hasTileDescription()) Imf::TiledOutputFile(stream, header);
+        else Imf::OutputFile(stream, header); // without pixels
+        std::string bytes = stream.str();
+        bytes.resize(1 << 16);
+        return bytes;
+    };
+    const auto check = [](const std::string& bytes) { check_exr_header("a.exr", std::as_bytes(std::span(bytes))); };
+    Imf::Header many(3840, 2160);
+    for (const char* name : {"R", "G", "B"}) many.channels().insert(name, Imf::Channel(Imf::HALF));
+    for (int k = 0; k < 60; ++k) many.channels().insert("pass" + std::to_string(k), Imf::Channel(Imf::HALF));
+    EXPECT_NO_THROW(check(header_bytes(many)));
+
+    Imf::Header tiled(30000, 32);
+    for (const char* name : {"R", "G", "B"}) tiled.channels().insert(name, Imf::Channel(Imf::HALF));
+    tiled.setTileDescription({64, 64});
+    EXPECT_NO_THROW(check(header_bytes(tiled)));
+    tiled.setTileDescription({1, 65536}); // a row of which is 2e9 pixels
+    EXPECT_THROW(check(header_bytes(tiled)), FileError);
+}
+
+TEST(WriteImage, RefusesWhatIsTooLargeBeforehand) {
+    EXPECT_NO_THROW(check_picture("a.exr", 16384, 8192));
+    EXPECT_THROW(check_picture("a.exr", 16384, 8193), UsageError);
+    EXPECT_NO_THROW(check_picture("a.png", 21600, 21600));
+    EXPECT_THROW(check_picture("a.png", 21700, 21700), UsageError);
 }
 
 TEST(WriteImage, RefusesOtherExtensionsAndMissingFolders) {

@@ -158,6 +158,26 @@ TEST(ObjLoader, NormalisesNormalsAndGivesUpUnusableOnes) {
     EXPECT_EQ(scene.summary.replaced_normals, 4u);
 }
 
+TEST(ObjLoader, WindsTrianglesAsTheirNormalsSay) {
+    // Mirrored, as by a negative scale: the normals are right, the winding is not.
+    const Scene scene = load_text(square_corners
+                                  + "vn 0.6 0 0.8\nvn -0.6 0 0.8\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\n"
+                                    "f 1/1/1 3/3/3 2/2/2\n"
+                                    "f 1/1/1 2/2/2 3/3/3\n"
+                                    "f 1 4 3\n");
+    expect_sound(scene);
+    for (const std::size_t i : {0u, 1u}) {
+        EXPECT_EQ(scene.triangles[i], (Triangle{0, 1, 2})) << i;
+        EXPECT_EQ(scene.normal_indices[i], (Triangle{0, 1, 2})) << i;
+        EXPECT_EQ(scene.texture_indices[i], (Triangle{0, 1, 2})) << i;
+    }
+    EXPECT_LT(scene.triangle_normal(2).z(), 0.0f); // no normals: as it is
+    const Surface surface(scene);
+    const Hit hit = surface.closest_hit({{0.3f, 0.1f, 1.0f}, -Vec3::UnitZ()});
+    ASSERT_TRUE(hit);
+    EXPECT_GT(std::abs(surface.point(hit).normal.x()), 0.1f) << "not flat";
+}
+
 TEST(ObjLoader, GivesUpUnusableTextureCoordinates) {
     const Scene scene = load_text(square_corners
                                   + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 3.4e38\n"

@@ -70,6 +70,19 @@ TEST(EarlyEnd, ByAnExceptionThatLeavesAThreadIsOneLineAndStatusOne) {
                 "^thrower: out of ideas\n$");
 }
 
+TEST(EarlyEnd, ByAFileThatIsCutShortInUseIsOneLineAndStatusOne) {
+    const TemporaryFolder folder;
+    const std::string path = folder.write("a", std::string(1 << 16, 'a'));
+    EXPECT_EXIT(
+        {
+            prepare_process("reader");
+            const MappedFile file(path);
+            std::filesystem::resize_file(path, 1);
+            std::_Exit(file.bytes()[1 << 15] == std::byte{'a'} ? 7 : 8);
+        },
+        ::testing::ExitedWithCode(1), "^reader: a file was cut short while it was read\n$");
+}
+
 TEST(PrepareProcess, KeepsFilesOutOfClosedStandardStreams) {
     const TemporaryFolder folder;
     const std::string path = folder.path("a");

@@ -149,6 +149,29 @@ TEST(Surface, AnswersPacketsLikeSingleRays) {
     }
 }
 
+TEST(Surface, TellsOfManySegmentsLikeOfSingleOnes) {
+    const Scene scene = triangle_soup(300);
+    const Surface surface(scene);
+    for (const std::size_t count : {0u, 1u, 7u, 8u, 9u, 1001u}) {
+        std::vector<Vec3> from, to;
+        for (const Ray& ray : random_rays(static_cast<int>(count), 7)) {
+            from.push_back(ray.origin);
+            to.push_back(from.size() % 5 == 0 ? ray.origin : Vec3(ray.origin + 0.5f * ray.direction)); // also of no length
+        }
+        std::vector<std::uint8_t> blocked(count, 2);
+        surface.blocked(from, to, blocked);
+        std::size_t sum = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            EXPECT_EQ(blocked[i], surface.blocked(from[i], to[i])) << i;
+            sum += blocked[i];
+        }
+        if (count > 1000) {
+            EXPECT_GT(sum, 100u);
+            EXPECT_LT(sum, 900u);
+        }
+    }
+}
+
 TEST(Surface, TurnsItsNormalsToTheViewer) {
     const Scene scene = triangle_soup(300);
     const Surface surface(scene);

@@ -44,7 +44,7 @@ def undisturbed(command):
     process = start(command)
     errors = process.communicate()[1]
     expect(process.returncode == 0, f"the undisturbed run failed: {errors}")
-    return time.monotonic() - begin
+    return time.monotonic() - begin, errors
 
 
 def processor_seconds(process):
@@ -66,25 +66,25 @@ def end(process, number):
 
 
 def killed(command, number, moment):
-    """Runs the command, kills it at the moment if it is not done by then. Returns whether it was killed, and
-    the seconds from the signal to the end."""
+    """Runs the command, kills it at the moment if it is not done by then. Returns whether it was killed, the
+    seconds from the signal to the end, and what it said."""
     process = start(command)
     try:
         errors = process.communicate(timeout=moment)[1]
         expect(process.returncode == 0, f"status {process.returncode} of a run that was not killed: {errors}")
-        return False, 0.0
+        return False, 0.0, errors
     except subprocess.TimeoutExpired:
         pass
     seconds = end(process, number)
     errors = process.stderr.read()
     process.stderr.close()
     if process.returncode == 0:
-        return False, seconds  # it was done just then
+        return False, seconds, errors  # it was done just then
     if number == signal.SIGKILL:
         expect(process.returncode == -number, f"status {process.returncode} after SIGKILL")
-        return True, seconds
+        return True, seconds, errors
     if process.returncode == -number and not errors:
-        return True, seconds  # it had not come to main() yet
+        return True, seconds, errors  # it had not come to main() yet
     expect(process.returncode == 128 + number, f"status {process.returncode} after {number.name}: {errors}")
     last = errors.splitlines()[-1] if errors else ""
     words = {signal.SIGINT: "afterglow: interrupted", signal.SIGTERM: "afterglow: ended by SIGTERM"}[number]
@@ -93,7 +93,7 @@ def killed(command, number, moment):
     if "--checkpoint" in command and not output.exists():
         expect("goes on from" in last, f"no word of the checkpoint in '{last}'")
     expect(seconds < LIMIT, f"{seconds:.2f} s from {number.name} to the end")
-    return True, seconds
+    return True, seconds, errors
 
 
 def look_at(folder, right, may_be_unfinished):
@@ -113,13 +113,14 @@ def look_at(folder, right, may_be_unfinished):
 def kill_alone(number, moments, command, folder, right):
     count = longest = whole = unfinished = 0
     for moment in moments:
-        was_killed, seconds = killed(command, number, moment)
+        was_killed, seconds, _ = killed(command, number, moment)
         count += was_killed
         longest = max(longest, seconds)
         found = look_at(folder, right, number == signal.SIGKILL)
         whole += found[0]
         unfinished += found[1]
         (folder / "t").unlink(missing_ok=True)
+    expect(count > 0, f"no run was still there when {number.name} came")
     undisturbed(command)  # also tidies up
     expect([path.name for path in folder.iterdir()] == ["t"], "something is left beside the file of the next run")
     expect((folder / "t").read_bytes() == right, "the next run made other bytes")
@@ -129,24 +130,26 @@ def kill_alone(number, moments, command, folder, right):
 
 
 def kill_and_go_on(number, kills, rng, span, command, folder, right):
-    count = runs = finished = 0
+    count = runs = finished = resumed = 0
     longest = 0.0
-    while count < kills:
+    while count < kills or (resumed == 0 and count < 10 * kills):
         runs += 1
-        was_killed, seconds = killed(command, number, rng.uniform(0.2, 0.7) * span)
+        was_killed, seconds, errors = killed(command, number, rng.uniform(0.2, 0.7) * span)
         count += was_killed
+        resumed += "are there already" in errors
         longest = max(longest, seconds)
         whole, _ = look_at(folder, right, number == signal.SIGKILL)
         if not was_killed:
             expect(whole == 1, "a run that ended by itself made no file")
             finished += 1
         (folder / "t").unlink(missing_ok=True)
-    undisturbed(command)
+    resumed += "are there already" in undisturbed(command)[1]
+    expect(resumed > 0, "no run went on from a checkpoint")
     expect((folder / "t").read_bytes() == right, "what went on from a checkpoint has other bytes")
     expect([path.name for path in folder.iterdir()] == ["t"], "a checkpoint is left")
     (folder / "t").unlink()
     print(f"{number.name} with --checkpoint: {count} of {runs + 1} runs killed, {longest:.3f} s to the end at most; "
-          f"{finished + 1} went on to the end, all with the right bytes", flush=True)
+          f"{resumed} went on from a checkpoint, {finished + 1} to the end, all with the right bytes", flush=True)
 
 
 def main():
@@ -163,7 +166,7 @@ def main():
         folder = pathlib.Path(name)
         command = [arguments.afterglow, "precompute", arguments.scene, "-o", str(folder / "t"),
                    *shlex.split(arguments.options)]
-        span = min(undisturbed(command) for _ in range(2))
+        span = min(undisturbed(command)[0] for _ in range(2))
         right = (folder / "t").read_bytes()
         (folder / "t").unlink()
         print(f"undisturbed: {span:.2f} s, {len(right)} bytes", flush=True)

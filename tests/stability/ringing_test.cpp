@@ -34,7 +34,7 @@ TEST(Ringing, IsRareAndSmallUnderALampInBrightRooms) {
         const Display display(transfer, surface);
         for (std::size_t p = 0; p < places.size(); p += 100) {
             bool covered = false;
-            const Rgb clamped = display.net_irradiance(places[p], field, covered).max(0.0f);
+            const Rgb clamped = display.irradiance(places[p], places[p].normal, field, light, covered, 0);
             EXPECT_TRUE(clamped.isApprox(unclamped.col(static_cast<Index>(p)).max(0.0f), 1e-4f));
         }
     }

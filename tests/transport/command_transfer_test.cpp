@@ -64,7 +64,7 @@ TEST_F(CommandTransfer, PrecomputeGivesTheSameBytesOnAnyNumberOfThreads) {
         EXPECT_EQ(content_of(path), content_of(file())) << threads << " threads";
     }
     const std::string seeded = folder.path("seeded");
-    run("precompute builtin:cornell --seed 2 -o" + quoted(seeded) + small_settings);
+    ASSERT_EQ(run("precompute builtin:cornell --seed 2 -o" + quoted(seeded) + small_settings).status, 0);
     EXPECT_NE(content_of(seeded), content_of(file()));
 }
 
@@ -343,8 +343,10 @@ TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
     EXPECT_EQ(text.err + json.err, "");
 
     const std::string path = folder.path("t");
-    run("precompute builtin:cornell --no-verification -o" + quoted(path) + small_settings);
-    EXPECT_EQ(run("info" + quoted(path)).out.find("verified"), std::string::npos);
+    ASSERT_EQ(run("precompute builtin:cornell --no-verification -o" + quoted(path) + small_settings).status, 0);
+    const std::string unverified = run("info" + quoted(path)).out;
+    EXPECT_NE(unverified.find("builtin:cornell"), std::string::npos);
+    EXPECT_EQ(unverified.find("verified"), std::string::npos);
 }
 
 TEST_F(CommandTransfer, ThePapersOperatorServesAllCommands) {

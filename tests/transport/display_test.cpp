@@ -42,7 +42,7 @@ TEST(Display, CoversAllThatIsInSightAndIsNeverNegative) {
         for (const SurfacePoint& x :
              points_in_sight(example.surface, *example.scene.viewpoint, 5000, 3)) {
             bool covered = false;
-            const Rgb e = display.net_irradiance(x, field, covered).max(0.0f);
+            const Rgb e = display.irradiance(x, x.normal, field, light, covered);
             EXPECT_TRUE((e >= 0.0f).all() && e.isFinite().all());
             ++all;
             uncovered += !covered;

@@ -53,6 +53,24 @@ TEST(LinkProducts, OfRowsAreSumsOverTheirLinks) {
     }
 }
 
+TEST(LinkProducts, RowsAreSoundWhereTheirSendersRiseAndAreThere) {
+    const Links links = random_rows();
+    for (Index i = 0; i < links.rows(); ++i) {
+        std::uint32_t needed = 0;
+        for (const PackedLink& packed : links.row(i)) needed += Links::step_of(Links::bits_of(packed));
+        EXPECT_TRUE(is_sound_row(links, i, needed)) << i;
+        if (needed == 0) continue;
+        EXPECT_FALSE(is_sound_row(links, i, needed - 1)) << i;
+        for (std::size_t k = 0; k < links.row(i).size(); ++k) { // a step of zero
+            std::vector<PackedLink> row(links.row(i).begin(), links.row(i).end());
+            row[k][0] &= 0x80;
+            if (Links::is_jump(Links::bits_of(row[k]))) row[k] = {};
+            std::vector<std::uint64_t> begin = {0, row.size()};
+            EXPECT_FALSE(is_sound_row({SharedArray(std::move(begin)), SharedArray(std::move(row))}, 0, sender_count)) << i;
+        }
+    }
+}
+
 TEST(LinkProducts, OfAColumnGoToItsReceiversAlone) {
     Rng rng(10, 0);
     const Eigen::Vector4f coefficient(0.3f, -2.0f, 0.7f, 0.0f);

@@ -40,9 +40,9 @@ double difference(const VectorIrradiance& a, const VectorIrradiance& b) {
     return std::sqrt(squares / size);
 }
 
-// Its tolerance is 0.001 and the solver's that it is compared with 0.002, both before what further
-// bounces make of them: at most 1 / (1 - 0.75), the largest reflectance here.
-constexpr double close = 4 * (0.001 + 0.002);
+// Its tolerance and the solver's that it is compared with, both before what further bounces make of
+// them: at most 1 / (1 - 0.75), the largest reflectance here.
+const double close = (MovingLight::Options().tolerance + LightTransport::usual_tolerance) / (1.0 - 0.75);
 
 TEST(MovingLight, IsIndirectLightWhereverTheLightGoes) {
     MovingLight moving(transport(), {});
@@ -64,6 +64,29 @@ TEST(MovingLight, IsIndirectLightWhereverTheLightGoes) {
     expect_close(0.202f);
     expect_close(0.45f);                                  // a jump
     for (int k = 0; k < 5; ++k) expect_close(k % 2 ? 0.45f : 0.1f); // to and fro: errors do not add up
+}
+
+TEST(MovingLight, LeavesNoPointBelowZero) {
+    // In units of the largest irradiance at a point of the display level, of any colour.
+    const auto least = [](const VectorIrradiance& field) {
+        const PointHierarchy& points = example().transfer.points;
+        float low = 0.0f, high = 0.0f;
+        for (Index i = points.begin(points.levels() - 1); i < points.size(); ++i) {
+            const Rgb e = net_irradiance(field, i, points.normal.col(i));
+            low = std::min(low, e.minCoeff());
+            high = std::max(high, e.maxCoeff());
+        }
+        return low / high;
+    };
+    Spotlight light = lamp(0.1f); // a spot, whose light changes within a few spacings
+    light.inner_angle = light.outer_angle = 5.0f;
+    EXPECT_LT(least(transport().gather(transport().radiosity(light))), -1e-3f) << "shows nothing";
+    EXPECT_GT(least(transport().indirect(light)), -1e-6f);
+    MovingLight moving(transport(), {});
+    for (int k = 0; k < 5; ++k) {
+        light.position.x() += 0.02f;
+        EXPECT_GT(least(moving.follow(light)), -1e-6f) << "pose " << k;
+    }
 }
 
 TEST(MovingLight, RestsWhenTheLightRests) {
@@ -120,6 +143,33 @@ TEST(MovingLight, ComesCloserRoundByRound) {
     for (int k = 0; k < 20 && !s.settled; ++k) moving.follow(lamp(0.35f), &s);
     EXPECT_TRUE(s.settled);
     EXPECT_LT(difference(moving.follow(lamp(0.35f)), expected), close);
+}
+
+TEST(MovingLight, EndsWhereItsRoundsDoNotConverge) {
+    TransferOperator gaining = example().transfer;
+    gaining.points.reflectance.setConstant(4.0f);
+    const LightTransport t(gaining, example().surface);
+    MovingLight moving(t, {});
+    MovingLightStatistics s;
+    moving.follow(lamp(0.2f), &s);
+    moving.follow(lamp(0.2002f), &s);
+    EXPECT_TRUE(s.settled && s.anew);
+    MovingLight by_rounds(t, {.most_rounds = 1}); // as a window asks
+    by_rounds.follow(lamp(0.2f), &s);
+    int rounds = 0;
+    do by_rounds.follow(lamp(0.2002f), &s);
+    while (!s.settled && ++rounds < 1000);
+    EXPECT_LT(rounds, 100);
+}
+
+TEST(MovingLight, FollowsALightTooStrongToSquare) {
+    MovingLight moving(transport(), {});
+    for (const float x : {0.2f, 0.21f}) {
+        Spotlight light = lamp(x);
+        light.intensity *= 1e22f;
+        const VectorIrradiance expected = transport().indirect(light);
+        EXPECT_LT(difference(moving.follow(light), expected), close) << x;
+    }
 }
 
 TEST(MovingLight, IsTheSameAtAnyNumberOfThreads) {

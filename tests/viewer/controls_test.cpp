@@ -116,7 +116,7 @@ TEST(LightControl, ItsCommandLineIsReadAsItWas) {
     CLI::App app;
     Camera read_camera;
     Spotlight read_light;
-    add_camera_options(app, read_camera);
+    add_camera_options(app, read_camera, true);
     add_light_options(app, read_light);
     app.parse(command_line(camera, light));
     EXPECT_EQ(read_camera.position, camera.position);
