@@ -75,9 +75,10 @@ with tempfile.TemporaryDirectory() as temporary:
                   f"vn {x:.4f} {y + 2:.4f} {z:.4f}", f"f {3 * k + 1}//{k + 1} {3 * k + 3}//{k + 1} {3 * k + 2}//{k + 1}"]
     lines += ["v -5 9 -5", "v 25 9 -5", "v 25 9 20", "v -5 9 20", "f -4 -3 -2 -1"]
     (folder / "s.obj").write_text("\n".join(lines) + "\n")
-    (folder / "points.csv").write_text("1.2,0,1.2,0,1,0\n")
-    light = ("--light-position", "10,8,7", "--light-direction", "0.1,-1,0", "--light-cone", "30,40")
-    for scene, viewpoint in ((folder / "s.obj", "10,4,7"), ("builtin:sphere:0.5", "0,0,0")):
+    for scene, viewpoint, lamp, point in ((folder / "s.obj", "10,4,7", "10,8,7", "4.2,0,4.2,0,1,0"),
+                                          ("builtin:sphere:0.5", "0,0,0", "0,0.5,0", "0.57,-0.76,0,-0.6,0.8,0")):
+        (folder / "points.csv").write_text(point + "\n")
+        light = ("--light-position", lamp, "--light-direction", "0.1,-1,0", "--light-cone", "30,40")
         for maker in (portable, fast):
             made = run(maker, "precompute", scene, "-o", folder / "s", "--viewpoint", viewpoint,
                        "--coarse-radius", 4, "--receiver-levels", 3, "--sender-levels", 2, "--rays", 16,
