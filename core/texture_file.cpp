@@ -36,7 +36,14 @@ void* noted(void* memory) {
 #define STBI_MALLOC(size) noted(std::calloc(size, 1))
 #define STBI_REALLOC(memory, size) noted(std::realloc(memory, size))
 #define STBI_FREE std::free
+// Where a JPEG picture ends before its last number, zero is shifted by more bits than there are: which is zero.
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((no_sanitize("shift-exponent"))), apply_to = function)
+#endif
 #include <stb_image.h>
+#ifdef __clang__
+#pragma clang attribute pop
+#endif
 
 namespace afterglow {
 namespace {

@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     double number = 0.0;
     CLI::App app;
     add_light_options(app, light);
-    add_camera_options(app, camera);
+    add_camera_options(app, camera, false);
     add_run_options(app, run);
     add_seed_option(app, run);
     add_number(app, "--number", number, "any");
