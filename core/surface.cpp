@@ -87,6 +87,7 @@ Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tre
     const Eigen::AlignedBox3f box = scene.bounds();
     const float largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
     lift_ = std::max(largest * 0x1p-19f, std::numeric_limits<float>::min());
+    reach_ = 1e-3f * box.sizes().maxCoeff();
 
     tree_->device = rtcNewDevice(nullptr);
     if (!tree_->device)
@@ -226,6 +227,25 @@ SurfacePoint Surface::point(const Hit& hit) const {
         }
     }
     return x;
+}
+
+PlacesMoved& PlacesMoved::operator+=(const PlacesMoved& more) {
+    moved += more.moved;
+    lost += more.lost;
+    farthest = std::max(farthest, more.farthest);
+    return *this;
+}
+
+PlacesMoved Surface::move_onto_surfaces(std::span<SurfacePoint> places) const {
+    return parallel_sum(static_cast<Index>(places.size()), PlacesMoved(), [&](Index i) -> PlacesMoved {
+        SurfacePoint& x = places[static_cast<std::size_t>(i)];
+        if (occluded({lifted(x), -x.normal, 3.0f * lift_})) return {};
+        const Hit above = closest_hit({x.position, x.normal, reach_}), below = closest_hit({x.position, -x.normal, reach_});
+        if (!above && !below) return {.lost = 1};
+        const Hit& closest = above.distance < below.distance ? above : below;
+        x.position = point(closest).position;
+        return {.moved = 1, .farthest = closest.distance};
+    }, 512);
 }
 
 Rgb Surface::reflectance(const Hit& hit) const {

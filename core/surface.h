@@ -25,6 +25,13 @@ struct Hit {
     explicit operator bool() const { return primitive != no_index; }
 };
 
+/// How places were moved onto surfaces.
+struct PlacesMoved {
+    Index moved = 0, lost = 0; // the latter: where there is no surface
+    float farthest = 0.0f;
+    PlacesMoved& operator+=(const PlacesMoved& more);
+};
+
 /// All that the basis and the transport ask of a scene's geometry: closest hit, occlusion, normal and
 /// reflectance [LZT08, sec. 5.1]. Immutable; all queries may run concurrently. Embree stays inside.
 class Surface {
@@ -68,10 +75,15 @@ public:
     /// Where rays that leave x start.
     Vec3 lifted(const SurfacePoint& x) const { return x.position + lift_ * x.normal; }
 
+    /// Moves places that lie on no surface, such as come from files of few digits, onto the closest one along
+    /// their normal, if that is within a thousandth of the scene's size. What lies on a surface within rounding
+    /// (lift()) stays as it is.
+    PlacesMoved move_onto_surfaces(std::span<SurfacePoint> places) const;
+
 private:
     struct Tree;
     const Scene& scene_;
-    float lift_;
+    float lift_, reach_; // the latter: of move_onto_surfaces()
     std::unique_ptr<Tree> tree_;
 
     Vec2 texture_coordinates(const Hit& hit) const;

@@ -30,7 +30,9 @@ void run(QueryCommand& command) {
     const VectorIrradiance field = opened.transport.indirect(command.light);
     Index uncovered = 0;
     std::size_t count = 0;
-    answer_points_csv(command.points, command.output, [&](std::span<const SurfacePoint> points) {
+    PlacesMoved moved;
+    answer_points_csv(command.points, command.output, [&](std::span<SurfacePoint> points) {
+        moved += opened.surface.move_onto_surfaces(points);
         Index without = 0;
         const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, command.light, &without);
         uncovered += without;
@@ -39,6 +41,7 @@ void run(QueryCommand& command) {
     });
 
     if (command.run.quiet) return;
+    tell_of_moved_places(moved, count);
     if (uncovered > 0)
         std::fprintf(stderr, "afterglow: warning: no function covers %lld of %lld points\n",
                      static_cast<long long>(uncovered), static_cast<long long>(count));

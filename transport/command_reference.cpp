@@ -65,7 +65,9 @@ void write_report(const std::string& path, const ReferenceCommand& command, cons
 
 Achieved trace_points(const ReferenceCommand& command, const Surface& surface,
                       const PathTracerOptions& options) {
-    const std::vector<SurfacePoint> points = read_points_csv(command.points);
+    std::vector<SurfacePoint> points = read_points_csv(command.points);
+    const PlacesMoved moved = surface.move_onto_surfaces(points);
+    if (!command.run.quiet) tell_of_moved_places(moved, points.size());
     const IrradianceEstimate estimate =
         estimate_irradiance(surface, {&command.light, 1}, points, options);
     write_irradiance_csv(command.output, estimate.indirect);

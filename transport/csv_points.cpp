@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <string_view>
 #include <utility>
@@ -94,6 +95,14 @@ std::vector<SurfacePoint> read_points_csv(const std::string& path) {
     return points;
 }
 
+void tell_of_moved_places(const PlacesMoved& moved, std::size_t count) {
+    if (moved.moved > 0)
+        std::fprintf(stderr, "%lld of %zu points lay off the surfaces, by %.2g at most, and were moved onto them\n",
+                     static_cast<long long>(moved.moved), count, static_cast<double>(moved.farthest));
+    if (moved.lost > 0)
+        std::fprintf(stderr, "afterglow: warning: %lld of %zu points are on no surface\n", static_cast<long long>(moved.lost), count);
+}
+
 void write_irradiance_csv(const std::string& path, const Eigen::Array3Xf& irradiance) {
     std::string text = irradiance_header;
     append_rows(text, irradiance);
@@ -101,7 +110,7 @@ void write_irradiance_csv(const std::string& path, const Eigen::Array3Xf& irradi
 }
 
 void answer_points_csv(const std::string& points, const std::string& output,
-                       const std::function<Eigen::Array3Xf(std::span<const SurfacePoint>)>& answer,
+                       const std::function<Eigen::Array3Xf(std::span<SurfacePoint>)>& answer,
                        std::size_t block) {
     write_atomically(output, [&](OutputFile& file) {
         std::vector<SurfacePoint> waiting;

@@ -172,6 +172,52 @@ TEST(Surface, TellsOfManySegmentsLikeOfSingleOnes) {
     }
 }
 
+TEST(Surface, MovesPlacesOntoTheClosestSurfaceAlongTheirNormal) {
+    const Scene scene = make_builtin_scene("builtin:sphere:0.5"); // of radius 1, so that places may be 2 mm off
+    const Surface surface(scene);
+    Rng rng(3, 0);
+    std::vector<SurfacePoint> on, off;
+    for (int i = 0; i < 500; ++i) {
+        const Hit hit = surface.closest_hit({Vec3::Zero(), sample_sphere({rng.uniform(), rng.uniform()})});
+        ASSERT_TRUE(hit);
+        on.push_back(surface.point(hit));
+        on.back().normal = surface.geometric_normal(hit);
+        off.push_back(on.back());
+        off.back().position += 1e-3f * (2.0f * rng.uniform() - 1.0f) * off.back().normal;
+    }
+    std::vector<SurfacePoint> same = on;
+    EXPECT_EQ(surface.move_onto_surfaces(same).moved, 0);
+    for (std::size_t i = 0; i < on.size(); ++i) EXPECT_EQ(same[i].position, on[i].position);
+    const PlacesMoved moved = surface.move_onto_surfaces(off);
+    EXPECT_GT(moved.moved, 450); // else they were within rounding
+    EXPECT_EQ(moved.lost, 0);
+    EXPECT_NEAR(moved.farthest, 1e-3f, 5e-5f);
+    for (std::size_t i = 0; i < on.size(); ++i) EXPECT_LT((off[i].position - on[i].position).norm(), 2.0f * surface.lift());
+
+    std::vector<SurfacePoint> far = {{Vec3(0.0f, -0.9f, 0.0f), Vec3::UnitY()}};
+    EXPECT_EQ(surface.move_onto_surfaces(far).lost, 1);
+    EXPECT_EQ(far[0].position, Vec3(0.0f, -0.9f, 0.0f));
+}
+
+TEST(Surface, LeavesPlacesInNarrowGapsWhereTheyAre) {
+    Scene scene = make_builtin_scene("builtin:furnace"); // from -1 to 1
+    const auto first = static_cast<std::uint32_t>(scene.positions.size());
+    for (const Vec3& corner : {Vec3(-0.5f, -0.9999f, -0.5f), Vec3(0.5f, -0.9999f, -0.5f), Vec3(0.0f, -0.9999f, 0.5f)})
+        scene.positions.push_back(corner); // a sheet a ten thousandth above the floor
+    scene.triangles.push_back({first, first + 1, first + 2});
+    scene.material_index.push_back(0);
+    const Surface surface(scene);
+    std::vector<SurfacePoint> places = {{Vec3(0.0f, -1.0f, 0.0f), Vec3::UnitY()},
+                                        {Vec3(0.0f, -0.9999f, 0.0f), Vec3::UnitY()},
+                                        {Vec3(0.0f, -0.9999f, 0.0f), -Vec3::UnitY()},
+                                        {Vec3(0.0f, -0.99997f, 0.0f), Vec3::UnitY()}};
+    EXPECT_EQ(surface.move_onto_surfaces(places).moved, 1);
+    EXPECT_EQ(places[0].position.y(), -1.0f);
+    EXPECT_EQ(places[1].position.y(), -0.9999f);
+    EXPECT_EQ(places[2].position.y(), -0.9999f);
+    EXPECT_NEAR(places[3].position.y(), -1.0f, 1e-6f); // of both the closer
+}
+
 TEST(Surface, TurnsItsNormalsToTheViewer) {
     const Scene scene = triangle_soup(300);
     const Surface surface(scene);

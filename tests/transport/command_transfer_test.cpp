@@ -328,6 +328,26 @@ TEST_F(CommandTransfer, PointsThatNothingCoversAreCounted) {
     EXPECT_EQ(run(query + " --quiet").err, "");
 }
 
+TEST_F(CommandTransfer, PointsOfFewDigitsAreMovedOntoTheSurface) {
+    const auto answer = [&](const std::string& subcommand, const std::string& point, std::string& err) {
+        const std::string points = folder.write("p.csv", point + ",0,1,0\n"), out = folder.path("a.csv");
+        const Outcome made = run(subcommand + " --points" + quoted(points) + " -o" + quoted(out) + light);
+        EXPECT_EQ(made.status, 0) << made.err;
+        err = made.err;
+        return read_irradiance_csv(out)(1, 0);
+    };
+    for (const std::string& subcommand : {"query" + quoted(file()), std::string("reference builtin:cornell --spp 64")}) {
+        std::string of_exact, of_rounded, of_none;
+        const float exact = answer(subcommand, "0.1,0,0.1", of_exact);
+        EXPECT_GT(exact, 0.0f);
+        EXPECT_EQ(of_exact.find("points"), std::string::npos) << of_exact;
+        EXPECT_NEAR(answer(subcommand, "0.1,-0.0004,0.1", of_rounded), exact, 1e-4f * exact) << "below the floor";
+        EXPECT_NE(of_rounded.find("1 of 1 points lay off the surfaces, by 0.0004 at most"), std::string::npos) << of_rounded;
+        answer(subcommand, "0.1,0.05,0.1", of_none);
+        EXPECT_NE(of_none.find("1 of 1 points are on no surface"), std::string::npos) << of_none;
+    }
+}
+
 TEST_F(CommandTransfer, InfoTellsAPersonAndAProgram) {
     const Outcome text = run("info" + quoted(file()));
     EXPECT_EQ(text.status, 0) << text.err;
