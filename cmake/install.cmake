@@ -81,5 +81,5 @@ set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS "python3-matplotlib") # draws the fig
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libafterglow-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-    "libeigen3-dev, libembree-dev, libopenexr-dev, libstb-dev, libtbb-dev, libtinyobjloader-dev, libxxhash-dev, pkg-config")
+    "libeigen3-dev, libembree-dev, libopenexr-dev, libtbb-dev, libtinyobjloader-dev, libxxhash-dev, pkg-config")
 include(CPack)

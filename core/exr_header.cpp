@@ -138,8 +138,8 @@ void check_size(const std::string& path, const Part& part, std::size_t file_byte
     const bool has_sides = part.width > 0 && part.height > 0 && is_side(part.width) && is_side(part.height)
                            && is_side(part.tile_width) && is_side(part.tile_height);
     const std::int64_t most = std::min(most_exr_pixels, most_pixels_per_byte * static_cast<std::int64_t>(file_bytes));
-    // The picture itself is of three channels, and so is a row of tiles. Of all channels are buffers, as wide as the
-    // picture and as high as what is compressed at a time, or as a tile.
+    // The picture itself is of three channels, and so is a row of tiles. Buffers hold all channels: they are as wide as
+    // the picture and as high as what is compressed at a time, or as large as a tile.
     const std::int64_t lines = part.compression == dwab ? 256 : 32;
     const std::int64_t most_for_all = 3 * most / std::max<std::int64_t>(part.channels, 3);
     if (!has_sides || part.width * std::max(part.height, part.tile_height) > most || part.width * lines > most_for_all

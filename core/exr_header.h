@@ -7,7 +7,7 @@
 
 namespace afterglow {
 
-/// What a picture may have at most.
+/// Pixels that a picture may have at most.
 constexpr std::int64_t most_exr_pixels = std::int64_t{1} << 27;
 
 /// Reads the header of an OpenEXR file before the library does, which allocates what an attribute, a size

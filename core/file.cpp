@@ -209,7 +209,7 @@ MappedFile::MappedFile(const std::string& path) {
                           O_RDONLY | O_NONBLOCK); // opening a pipe must not wait for its writer
     struct stat status {};
     // No fault of the file, which might else be left out and passed over.
-    if (!file && (errno == EMFILE || errno == ENFILE)) throw Error("too many files are open to read " + path);
+    if (!file && (errno == EMFILE || errno == ENFILE)) throw Error("too many files are open to read " + path + "; close some, or lift the limit (ulimit -n)");
     if (!file || ::fstat(file, &status) != 0) throw FileError(path, "cannot be read: " + reason());
     if (!S_ISREG(status.st_mode)) throw FileError(path, "is not a regular file");
     size_ = static_cast<std::size_t>(status.st_size);

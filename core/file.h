@@ -44,7 +44,8 @@ void write_file(const std::string& path, std::string_view content);
 /// Makes a folder, and those it lies in, where it is not there. Throws FileError.
 void make_folder(const std::string& path);
 
-/// A whole file, mapped read-only. Throws FileError.
+/// A whole file, mapped read-only. Throws FileError where that is the file's fault, Error where too many are open,
+/// std::bad_alloc where there is no room for it. It must not be cut short by others while it is in use (process_end.h).
 class MappedFile {
 public:
     explicit MappedFile(const std::string& path);

@@ -61,18 +61,17 @@ void handle(int signal) {
     errno = before;
 }
 
-/// A file that is mapped into memory has become shorter: its bytes are not there. Only what is safe in a handler.
-void end_by_lost_bytes(int) {
-    constexpr std::string_view line = ": a file was cut short while it was read\n";
-    [[maybe_unused]] ssize_t written = ::write(STDERR_FILENO, EarlyEnd::program.data(), EarlyEnd::program.size());
-    written = ::write(STDERR_FILENO, line.data(), line.size());
-    ::_exit(1);
+/// Bytes of a file that is mapped into memory are not there any more: this thread can do nothing else.
+void handle_lost_bytes(int signal) {
+    handle(signal);
+    for (;;) ::pause();
 }
 
 void await_signal() {
     unsigned char number = 0;
     while (::read(signals[0], &number, 1) != 1) {
     }
+    if (number == SIGBUS) EarlyEnd::now(1, "a file was cut short, or could not be read, while it was in use");
     EarlyEnd::now(128 + number, number == SIGINT    ? "interrupted"
                                 : number == SIGTERM ? "ended by SIGTERM"
                                                     : "ended by SIGHUP");
@@ -115,7 +114,6 @@ void prepare_process(const std::string& program) {
             [[maybe_unused]] const int held = open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
     std::signal(SIGXFSZ, SIG_IGN);
     EarlyEnd::program = program;
-    std::signal(SIGBUS, end_by_lost_bytes);
     std::set_terminate(end_by_exception);
 
     if (pipe2(signals.data(), O_CLOEXEC) != 0)
@@ -126,6 +124,7 @@ void prepare_process(const std::string& program) {
     } catch (const std::system_error& error) {
         throw Error(std::string("no thread can be started: ") + error.what());
     }
+    std::signal(SIGBUS, handle_lost_bytes);
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         struct sigaction action {};
         sigaction(signal, nullptr, &action);

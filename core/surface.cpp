@@ -87,7 +87,7 @@ Surface::Surface(const Scene& scene) : scene_(scene), tree_(std::make_unique<Tre
     const Eigen::AlignedBox3f box = scene.bounds();
     const float largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
     lift_ = std::max(largest * 0x1p-19f, std::numeric_limits<float>::min());
-    reach_ = 1e-3f * box.sizes().maxCoeff();
+    reach_ = std::max(1e-3f * box.sizes().maxCoeff(), 8.0f * lift_);
 
     tree_->device = rtcNewDevice(nullptr);
     if (!tree_->device)

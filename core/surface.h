@@ -76,8 +76,8 @@ public:
     Vec3 lifted(const SurfacePoint& x) const { return x.position + lift_ * x.normal; }
 
     /// Moves places that lie on no surface, such as come from files of few digits, onto the closest one along
-    /// their normal, if that is within a thousandth of the scene's size. What lies on a surface within rounding
-    /// (lift()) stays as it is.
+    /// their normal, to either side, if that is within a thousandth of the scene's size. What lies at most lift()
+    /// behind a surface or twice that in front of it is on it, and stays as it is. Returns how many were moved.
     PlacesMoved move_onto_surfaces(std::span<SurfacePoint> places) const;
 
 private:

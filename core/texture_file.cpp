@@ -108,10 +108,16 @@ bool has_sound_tables(std::string_view segment) {
     return true;
 }
 
-/// Calls visit(marker, what follows it) for each marker of a JPEG file, until it returns false. Up to the first
-/// scan, segments are passed over as a whole; behind it, all that looks like a marker is taken for one.
+/// Segments that say how long they are.
+bool has_length(char marker) {
+    return (marker & '\xf0') == '\xe0' || "\xfe\xc4\xdb\xdd\xda"sv.find(marker) != std::string_view::npos;
+}
+
+/// Calls visit(marker, what follows it, whether it is before the first scan) for each marker of a JPEG file, until
+/// it returns false. Up to the first scan, segments are passed over as a whole; behind it, all that looks like a
+/// marker is taken for one, also within segments unless these are to be `whole`.
 template <class Visit>
-void for_each_marker(std::string_view file, const Visit& visit) {
+void for_each_marker(std::string_view file, bool whole, const Visit& visit) {
     constexpr char scan = '\xda';
     bool in_header = true;
     for (std::size_t at = 2; at + 2 <= file.size();) {
@@ -123,7 +129,7 @@ void for_each_marker(std::string_view file, const Visit& visit) {
         const std::string_view segment = file.substr(at + 2);
         in_header = in_header && marker != scan;
         if (!visit(marker, segment, in_header)) return;
-        at += in_header ? 2 + big_endian(segment, 2) : 1;
+        at += in_header || (whole && has_length(marker)) ? 2 + big_endian(segment, 2) : 1;
     }
 }
 
@@ -131,7 +137,7 @@ void for_each_marker(std::string_view file, const Visit& visit) {
 bool has_sound_jpeg_tables(std::string_view file) {
     constexpr char huffman_tables = '\xc4';
     bool is_sound = true;
-    for_each_marker(file, [&](char marker, std::string_view segment, bool) {
+    for_each_marker(file, false, [&](char marker, std::string_view segment, bool) {
         is_sound = marker != huffman_tables || has_sound_tables(segment);
         return is_sound;
     });
@@ -142,7 +148,7 @@ bool has_sound_jpeg_tables(std::string_view file) {
 std::string_view picture_alone(std::string_view file) {
     constexpr char end = '\xd9';
     std::size_t size = file.size();
-    for_each_marker(file, [&](char marker, std::string_view segment, bool in_header) {
+    for_each_marker(file, true, [&](char marker, std::string_view segment, bool in_header) {
         if (in_header || marker != end) return true;
         size -= segment.size();
         return false;
@@ -193,7 +199,7 @@ Texture read_picture(const std::string& path, const std::array<float, 256>& valu
     if (count > std::min(most_texels, most_texels_in(text)))
         throw FileError(path, "has an impossible size of " + std::to_string(texture.width) + "x"
                                   + std::to_string(texture.height) + " texels in "
-                                  + std::to_string(bytes.size()) + " bytes");
+                                  + std::to_string(text.size()) + " bytes");
     const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
         stbi_load_from_memory(data, size, &texture.width, &texture.height, &channels, 3),
         stbi_image_free);

@@ -16,7 +16,7 @@ struct NormalSource {
 };
 
 /// Reads a picture (PNG, JPEG, TGA or BMP), 8 bits a channel, from sRGB into linear light. Throws
-/// FileError; nothing is allocated by a size that the file claims but cannot hold.
+/// FileError where that is the file's fault, else as MappedFile does; nothing is allocated by a size that the file claims but cannot hold.
 Texture read_texture(const std::string& path);
 
 /// Likewise, into unit vectors, see normal_map.h.

@@ -35,9 +35,10 @@ ToneMap::ToneMap(const Image& image, float key) {
 }
 
 Rgb ToneMap::operator()(const Rgb& colour) const {
-    const Rgb c = (colour > 1e30f).select(Rgb::Constant(1e30f), colour); // also of what is infinite, products are finite
-    const float l = std::max(0.0f, scale * luminance(c));
-    return c * scale * (1.0f + l / (white * white)) / (1.0f + l);
+    const Rgb scaled = scale * colour;
+    const Rgb c = (scaled > 1e15f).select(Rgb::Constant(1e15f), scaled); // what is infinite, too, has finite products
+    const float l = std::max(0.0f, luminance(c));
+    return c * (1.0f + l / (white * white)) / (1.0f + l);
 }
 
 } // namespace afterglow

@@ -17,7 +17,7 @@ namespace afterglow {
 /// without points throws FileError with the number of the line.
 std::vector<SurfacePoint> read_points_csv(const std::string& path);
 
-/// One line on stderr where places of a file lay off the surfaces, of so many.
+/// Says on stderr how many places of a file, of so many, lay off the surfaces.
 void tell_of_moved_places(const PlacesMoved& moved, std::size_t count);
 
 /// Writes the header `E_r,E_g,E_b` and one line a column with as many digits as give the same float

@@ -75,10 +75,6 @@ __m256i running_sums(__m256i v) {
     return _mm256_add_epi32(v, _mm256_permute2x128_si256(totals, totals, 0x08));
 }
 
-} // namespace
-
-namespace {
-
 /// The bits of eight entries, 24 each.
 __m256i bits_of_eight(const PackedLink* from) {
     const __m256i spread_bytes =
@@ -184,7 +180,7 @@ void add_column(std::span<const ColumnLink> links, const float* coefficient, flo
     const __m256 c = _mm256_broadcast_ps(reinterpret_cast<const __m128*>(coefficient));
     const __m256i receiver_bits = kept(_mm256_set1_epi32(ColumnLink::block_size - 1));
     const __m256i exponent_bits = EightLinks::exponent_bits(), bias = EightLinks::bias();
-    /// `product`: where that of receiver k of eight is.
+    // `product`: where that of receiver k of eight is.
     const auto add = [&](__m256i bits, std::size_t count, const auto& product) __attribute__((always_inline)) {
         const auto eight = EightLinks::decode<10, 18>(bits, exponent_bits, bias);
         alignas(32) std::array<std::uint32_t, width> receiver;

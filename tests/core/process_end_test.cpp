@@ -6,7 +6,11 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
 #include <new>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -72,15 +76,15 @@ TEST(EarlyEnd, ByAnExceptionThatLeavesAThreadIsOneLineAndStatusOne) {
 
 TEST(EarlyEnd, ByAFileThatIsCutShortInUseIsOneLineAndStatusOne) {
     const TemporaryFolder folder;
-    const std::string path = folder.write("a", std::string(1 << 16, 'a'));
+    const std::string path = folder.write("a", std::string(1 << 20, 'a'));
     EXPECT_EXIT(
         {
             prepare_process("reader");
             const MappedFile file(path);
             std::filesystem::resize_file(path, 1);
-            std::_Exit(file.bytes()[1 << 15] == std::byte{'a'} ? 7 : 8);
+            std::_Exit(file.bytes()[1 << 19] == std::byte{'a'} ? 7 : 8);
         },
-        ::testing::ExitedWithCode(1), "^reader: a file was cut short while it was read\n$");
+        ::testing::ExitedWithCode(1), "^reader: a file was cut short, or could not be read, while it was in use\n$");
 }
 
 TEST(PrepareProcess, KeepsFilesOutOfClosedStandardStreams) {

@@ -76,8 +76,7 @@ def killed(command, number, moment):
     except subprocess.TimeoutExpired:
         pass
     seconds = end(process, number)
-    errors = process.stderr.read()
-    process.stderr.close()
+    errors = process.communicate()[1]  # with what it said before
     if process.returncode == 0:
         return False, seconds, errors  # it was done just then
     if number == signal.SIGKILL:
