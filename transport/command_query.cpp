@@ -27,14 +27,15 @@ void run(QueryCommand& command) {
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
     if (!command.run.quiet) tell_of_outside_files(opened.scene);
-    const VectorIrradiance field = opened.transport.indirect(command.light);
+    const Spotlight light = command.light.off_surfaces(opened.surface);
+    const VectorIrradiance field = opened.transport.indirect(light);
     Index uncovered = 0;
     std::size_t count = 0;
     PlacesMoved moved;
     answer_points_csv(command.points, command.output, [&](std::span<SurfacePoint> points) {
         moved += opened.surface.move_onto_surfaces(points);
         Index without = 0;
-        const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, command.light, &without);
+        const Eigen::Array3Xf irradiance = opened.display.irradiance(points, field, light, &without);
         uncovered += without;
         count += points.size();
         return irradiance;

@@ -65,11 +65,12 @@ void write_report(const std::string& path, const ReferenceCommand& command, cons
 
 Achieved trace_points(const ReferenceCommand& command, const Surface& surface,
                       const PathTracerOptions& options) {
+    const Spotlight light = command.light.off_surfaces(surface);
     std::vector<SurfacePoint> points = read_points_csv(command.points);
     const PlacesMoved moved = surface.move_onto_surfaces(points);
     if (!command.run.quiet) tell_of_moved_places(moved, points.size());
     const IrradianceEstimate estimate =
-        estimate_irradiance(surface, {&command.light, 1}, points, options);
+        estimate_irradiance(surface, {&light, 1}, points, options);
     write_irradiance_csv(command.output, estimate.indirect);
     return {estimate.relative_error[0], 0.0, estimate.samples, estimate.rays};
 }
@@ -77,7 +78,7 @@ Achieved trace_points(const ReferenceCommand& command, const Surface& surface,
 Achieved trace_picture(const ReferenceCommand& command, const Surface& surface,
                        PathTracerOptions options) {
     options.batches = 4; // a pixel has few samples, and a picture many pixels
-    PictureEstimate estimate = render_reference(surface, command.light, command.camera,
+    PictureEstimate estimate = render_reference(surface, command.light.off_surfaces(surface), command.camera,
                                                 layer_from_name(command.layer), options);
     const Achieved achieved{estimate.relative_error, 0.0, estimate.samples, estimate.rays};
     estimate.image.attributes = provenance(command, surface.scene(), achieved);

@@ -62,10 +62,10 @@ void run(RenderCommand& command) {
     const auto start = Clock::now();
     NeumannStatistics neumann;
     VectorIrradiance field;
-    if (layer != Layer::direct)
-        field = opened.transport.indirect(command.light, &neumann);
+    const Spotlight light = command.light.off_surfaces(opened.surface);
+    if (layer != Layer::direct) field = opened.transport.indirect(light, &neumann);
     const auto lit = Clock::now();
-    RenderedPicture picture = render_picture(opened.surface, opened.display, field, command.light,
+    RenderedPicture picture = render_picture(opened.surface, opened.display, field, light,
                                              command.camera, layer, command.samples,
                                              command.gap_paths);
     const auto rendered = Clock::now();

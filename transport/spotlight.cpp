@@ -25,6 +25,24 @@ void Spotlight::check() {
         throw UsageError("a spotlight's direction must not be zero");
 }
 
+Spotlight Spotlight::off_surfaces(const Surface& surface) const {
+    Spotlight moved = *this;
+    const float lift = surface.lift();
+    const Vec3 middle = surface.scene().bounds().center();
+    for (int axis = 0; axis < 3; ++axis) // a plane through the light crosses one of them at 55 degrees or less
+        for (const float sign : {-1.0f, 1.0f}) {
+            const Vec3 along = sign * Vec3::Unit(axis);
+            const Hit hit = surface.closest_hit({moved.position - 4.0f * lift * along, along, 8.0f * lift});
+            if (!hit) continue;
+            Vec3 normal = surface.geometric_normal(hit);
+            const float towards = normal.dot(direction);
+            if ((std::abs(towards) > 1e-3f ? towards : normal.dot(middle - position)) < 0.0f) normal = -normal;
+            const float height = (moved.position - surface.point(hit).position).dot(normal);
+            if (std::abs(height) < 2.0f * lift) moved.position += (3.0f * lift - height) * normal;
+        }
+    return moved;
+}
+
 float cos_degrees(float angle) {
     return static_cast<float>(std::cos(static_cast<double>(angle) * std::numbers::pi / 180.0));
 }

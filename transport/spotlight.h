@@ -24,6 +24,10 @@ struct Spotlight {
         return position == other.position && direction == other.direction
                && inner_angle == other.inner_angle && outer_angle == other.outer_angle;
     }
+    /// The same light, moved off the surfaces that it lies on within a few roundings (Surface::lift()), to the side
+    /// that it shines to (along a wall: to the scene's middle): as a lamp in the plane of its ceiling, of which rounding
+    /// would hide some.
+    Spotlight off_surfaces(const Surface& surface) const;
     /// Share of the intensity sent at the cosine c of the angle from the axis, in [0, 1].
     float falloff(float c) const;
 };

@@ -1,3 +1,4 @@
+#include "core/builtin_scenes.h"
 #include "core/error.h"
 #include "core/sampling.h"
 #include "transport/spotlight.h"
@@ -67,6 +68,29 @@ TEST(Spotlight, IrradianceOnAPlaneIsIntensityTimesFalloffTimesCosineOverSquaredD
     }
     EXPECT_GT(lit, 100);
     EXPECT_LT(lit, 900);
+}
+
+TEST(Spotlight, IsMovedOffTheSurfacesThatItLiesOn) {
+    const Scene scene = make_builtin_scene("builtin:furnace"); // from -1 to 1
+    const Surface surface(scene);
+    const auto moved = [&](const Vec3& position, const Vec3& direction) -> Vec3 {
+        return Spotlight{.position = position, .direction = direction}.off_surfaces(surface).position;
+    };
+    const float lift = surface.lift();
+    const Vec3 down = -Vec3::UnitY(), inside(0.2f, 0.9f, 0.3f);
+    EXPECT_EQ(moved(inside, down), inside);
+    for (const float off : {-1.0f, 0.0f, 1.0f}) { // in the ceiling, within rounding
+        const Vec3 lamp = moved(Vec3(0.2f, 1.0f + off * lift, 0.3f), down);
+        EXPECT_NEAR(lamp.y(), 1.0f - 3.0f * lift, 0.5f * lift);
+        EXPECT_EQ(lamp.x(), 0.2f);
+        for (float x = -0.999f; x < 1.0f; x += 0.037f) {
+            const SurfacePoint floor{Vec3(x, -1.0f, 0.5f), Vec3::UnitY()};
+            EXPECT_FALSE(surface.blocked(surface.lifted(floor), lamp)) << x;
+        }
+    }
+    EXPECT_NEAR(moved(Vec3(1.0f, 0.0f, 0.0f), down).x(), 1.0f - 3.0f * lift, 0.5f * lift) << "along a wall";
+    const Vec3 corner = moved(Vec3(1.0f, 1.0f, -1.0f), Vec3(-0.6f, -0.6f, 0.5f).normalized());
+    EXPECT_LT((corner - Vec3(1.0f - 3.0f * lift, 1.0f - 3.0f * lift, -1.0f + 3.0f * lift)).cwiseAbs().maxCoeff(), lift);
 }
 
 TEST(Spotlight, CheckNormalisesTheDirectionAndRefusesTheImpossible) {
