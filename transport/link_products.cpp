@@ -7,6 +7,24 @@
 #endif
 
 namespace afterglow {
+namespace {
+
+/// Steps from sender to sender of a row, counted from -1.
+struct RowSteps {
+    std::uint64_t sum = 0;
+    bool has_zero = false;
+
+    void add(std::span<const PackedLink> entries) {
+        for (const PackedLink& packed : entries) {
+            const std::uint32_t step = Links::step_of(Links::bits_of(packed));
+            has_zero |= step == 0;
+            sum += step;
+        }
+    }
+    bool are_sound(std::uint32_t senders) const { return !has_zero && sum <= senders; }
+};
+
+} // namespace
 
 #if defined(__AVX2__) && defined(__FMA__)
 
@@ -140,8 +158,7 @@ bool is_sound_row(const Links& links, Index row, std::uint32_t senders) {
     const std::span<const PackedLink> entries = links.row(row);
     const Steps steps;
     constexpr std::size_t most = std::size_t{1} << 22; // of whose steps the sum is below 2^32 in each lane
-    bool has_zero = false;
-    std::uint64_t sum = 0;
+    RowSteps row_steps;
     std::size_t k = 0;
     while (entries.size() - k >= width) {
         __m256i sums = _mm256_setzero_si256(), zeros = sums;
@@ -152,15 +169,11 @@ bool is_sound_row(const Links& links, Index row, std::uint32_t senders) {
         }
         std::array<std::uint32_t, width> lanes;
         _mm256_storeu_si256(reinterpret_cast<__m256i*>(lanes.data()), sums);
-        for (const std::uint32_t lane : lanes) sum += lane;
-        has_zero |= _mm256_testz_si256(zeros, zeros) == 0;
+        for (const std::uint32_t lane : lanes) row_steps.sum += lane;
+        row_steps.has_zero |= _mm256_testz_si256(zeros, zeros) == 0;
     }
-    for (; k < entries.size(); ++k) {
-        const std::uint32_t step = Links::step_of(Links::bits_of(entries[k]));
-        has_zero |= step == 0;
-        sum += step;
-    }
-    return !has_zero && sum <= senders; // counted from -1
+    row_steps.add(entries.subspan(k));
+    return row_steps.are_sound(senders);
 }
 
 namespace {
@@ -227,14 +240,9 @@ LinkProduct multiply_row(const Links& links, Index row, const float* coefficient
 }
 
 bool is_sound_row(const Links& links, Index row, std::uint32_t senders) {
-    bool has_zero = false;
-    std::uint64_t sum = 0;
-    for (const PackedLink& packed : links.row(row)) {
-        const std::uint32_t step = Links::step_of(Links::bits_of(packed));
-        has_zero |= step == 0;
-        sum += step;
-    }
-    return !has_zero && sum <= senders; // counted from -1
+    RowSteps steps;
+    steps.add(links.row(row));
+    return steps.are_sound(senders);
 }
 
 void add_column(std::span<const ColumnLink> links, const float* coefficient, float* products) {

@@ -73,6 +73,7 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
         frame.camera.width = options.width;
         frame.camera.height = options.height;
         frame.camera.check();
+        frame.light = frame.light.off_surfaces(scene.surface);
     }
     make_folder(options.folder);
 

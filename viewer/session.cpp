@@ -51,8 +51,9 @@ Session::Session(const Gl& gl, const std::string& file, const std::string& scene
     : path(file), scene(file, scene_override), solver(scene, 1), renderer(gl, scene, method),
       overlays(scene), camera(first_camera(scene)),
       scene_size(scene.scene.bounds().sizes().norm()), light_thread([this](const Spotlight& pose) {
-          const auto field = solver.solve(pose);
-          return LitField{pose, field, solver.statistics()};
+          const Spotlight off = pose.off_surfaces(scene.surface);
+          const auto field = solver.solve(off);
+          return LitField{off, field, solver.statistics()};
       }) {
     tell_of_outside_files(scene.scene);
     light = first_light(camera, scene_size);

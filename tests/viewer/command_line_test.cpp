@@ -1,3 +1,4 @@
+#include "core/image.h"
 #include "tests/support/small_transfer.h"
 
 #include "tests/support/program.h" // its `light` must not come before others' parameters
@@ -5,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <numeric>
 #include <string>
+#include <vector>
 
 // Runs afterglow-view itself.
 
@@ -59,6 +62,22 @@ TEST(CommandLine, DrawsTheSameBytesAtAnyNumberOfThreads) {
     for (const char* threads : {"1", "2"})
         EXPECT_EQ(run("'" + files.file + "'" + files.frame_options(threads) + "--indirect gather --format exr --threads " + threads).status, 0);
     EXPECT_EQ(content_of(files.folder.path("1") + "/frame_0001.exr"), content_of(files.folder.path("2") + "/frame_0001.exr"));
+}
+
+TEST(CommandLine, ALampInItsCeilingShinesAsOneBelowIt) {
+    const Files files;
+    const auto lit_by_lamp_at = [&](const std::string& height) {
+        const std::string path = files.folder.write(height + ".json",
+            R"([{"camera": {"position": [0.278, 0.273, -0.8], "target": [0.278, 0.273, 0]},
+                 "light": {"position": [0.278, )" + height + R"(, 0.28], "direction": [0, -1, 0], "cone": [60, 80]}}])");
+        const std::string output = files.folder.path(height);
+        EXPECT_EQ(run("'" + files.file + "' --headless --frames '" + path + "' -o '" + output + "' --size 64x48 --format exr").status, 0);
+        const std::vector<float> rgb = read_exr(output + "/frame_0000.exr").rgb;
+        return std::accumulate(rgb.begin(), rgb.end(), 0.0f) / static_cast<float>(rgb.size());
+    };
+    const float below = lit_by_lamp_at("0.547");
+    EXPECT_GT(below, 0.0f);
+    EXPECT_NEAR(lit_by_lamp_at("0.5488001"), below, 0.02f * below);
 }
 
 TEST(CommandLine, DrawsThePathUntilTheTimeHasPassed) {
