@@ -11,18 +11,22 @@
 #include "transport/transfer_file.h"
 
 #include <CLI/CLI.hpp>
+#include <tiny_obj_loader.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
 
 // Speed beside what it is made of, in one run, by hand: `precompute` against Embree alone with the same
-// rays, `update` of a moving light against reading its operator once, `lookup` of functions in three ways.
+// rays, `load` against tinyobjloader alone, `update` of a moving light against reading its operator once,
+// `lookup` of functions in three ways.
 
 namespace afterglow {
 namespace {
@@ -110,6 +114,19 @@ double gather_rays_alone(const Surface& surface, const EmbreeAlone& embree, cons
     return seconds;
 }
 
+/// The gather's rays, were none spared: as many on the display level as on the next one, and on coarser ones as many
+/// as make their links no noisier, (R_l / R_L)^1.5 times as many.
+std::uint64_t rays_unless_spared(const PointHierarchy& points, const LinkOptions& options) {
+    std::uint64_t rays = 0;
+    for (int l = 0; l < points.levels(); ++l) {
+        if (!points.leads_to_display(l)) continue;
+        const double ratio = std::max(1.0f, points.spacing[l] / points.spacing.back());
+        const double wanted = std::min<double>(options.rays * std::pow(ratio, 1.5), options.most_rays);
+        rays += static_cast<std::uint64_t>(points.end(l) - points.begin(l)) << static_cast<int>(std::log2(wanted) + 0.01);
+    }
+    return rays;
+}
+
 /// Seconds to evaluate the openness feature at all points that carry one.
 double features_alone(const Surface& surface, const PointHierarchy& points) {
     const auto start = Clock::now();
@@ -125,6 +142,7 @@ double features_alone(const Surface& surface, const PointHierarchy& points) {
 
 struct Run {
     double total, points, links, alone, features;
+    std::uint64_t rays, rays_unless_spared;
 };
 
 Run run_once(const Surface& surface, const EmbreeAlone& embree, const PrecomputeOptions& options) {
@@ -133,12 +151,13 @@ Run run_once(const Surface& surface, const EmbreeAlone& embree, const Precompute
     return {r.total_seconds, r.points_seconds,
             r.links.trace_seconds + r.links.rows_seconds + r.links.links_seconds,
             gather_rays_alone(surface, embree, transfer.points, options.links),
-            features_alone(surface, transfer.points)};
+            features_alone(surface, transfer.points),
+            r.links.rays, rays_unless_spared(transfer.points, options.links)};
 }
 
 void run_precompute(const std::vector<std::string>& names, int repeat, bool one_thread) {
-    std::printf("%-14s %9s %8s %8s %8s %8s %8s %8s\n", "scene", "total s", "links s", "Embree s", "ratio",
-                "points", "features", "threads");
+    std::printf("%-14s %9s %8s %8s %8s %8s %8s %8s %8s %8s\n", "scene", "total s", "links s", "Embree s", "ratio",
+                "points", "features", "threads", "Mrays", "of all");
     for (const std::string& name : names) {
         const double before = peak_memory();
         const Scene scene = load_scene(name);
@@ -149,7 +168,8 @@ void run_precompute(const std::vector<std::string>& names, int repeat, bool one_
         for (int k = 1; k < repeat; ++k) {
             const Run run = run_once(surface, embree, {});
             best = {std::min(best.total, run.total), std::min(best.points, run.points), std::min(best.links, run.links),
-                    std::min(best.alone, run.alone), std::min(best.features, run.features)};
+                    std::min(best.alone, run.alone), std::min(best.features, run.features), run.rays,
+                    run.rays_unless_spared};
         }
         if (one_thread) {
             const ThreadLimit limit(1);
@@ -158,12 +178,36 @@ void run_precompute(const std::vector<std::string>& names, int repeat, bool one_
             single = r.total_seconds;
         }
         const std::size_t slash = name.rfind('/');
-        std::printf("%-14s %9.2f %8.2f %8.2f %8.2f %8.3f %8.3f %8.2f  (%.0f MB at most)\n",
+        std::printf("%-14s %9.2f %8.2f %8.2f %8.2f %8.3f %8.3f %8.2f %8.1f %8.2f  (%.0f MB at most)\n",
                     name.substr(slash == std::string::npos ? 0 : slash + 1).c_str(), best.total, best.links,
                     best.alone, best.links / best.alone, best.points / best.total, best.features / best.total,
-                    single / best.total, 1e-6 * (peak_memory() - before));
+                    single / best.total, 1e-6 * static_cast<double>(best.rays),
+                    static_cast<double>(best.rays) / static_cast<double>(best.rays_unless_spared),
+                    1e-6 * (peak_memory() - before));
         std::fflush(stdout);
     }
+}
+
+/// Seconds to load a scene, beside what tinyobjloader takes for its own parse, which leaves the scene to be made.
+void run_load(const std::string& name, int repeat) {
+    double loaded = std::numeric_limits<double>::infinity(), parsed = loaded;
+    std::size_t triangles = 0;
+    for (int k = 0; k < repeat; ++k) {
+        const auto start = Clock::now();
+        triangles = load_scene(name).triangles.size();
+        loaded = std::min(loaded, seconds_since(start));
+        const auto again = Clock::now();
+        tinyobj::attrib_t attributes;
+        std::vector<tinyobj::shape_t> shapes;
+        std::vector<tinyobj::material_t> materials;
+        std::string warnings, errors;
+        const std::string folder = std::filesystem::path(name).parent_path().string() + "/";
+        if (!tinyobj::LoadObj(&attributes, &shapes, &materials, &warnings, &errors, name.c_str(), folder.c_str()))
+            throw Error("tinyobjloader: " + errors);
+        parsed = std::min(parsed, seconds_since(again));
+    }
+    std::printf("%zu triangles loaded in %.2f s; tinyobjloader alone %.2f s, ratio %.2f\n", triangles, loaded, parsed,
+                loaded / parsed);
 }
 
 /// A light that walks by steps of a centimetre through the middle of a scene.
@@ -277,6 +321,10 @@ int main(int argc, char** argv) {
         "Where the light starts (default 0 9 0, Sponza's nave)")->expected(3);
     update->callback([&] { afterglow::run_update(options); });
     std::string scene;
+    CLI::App* load = app.add_subcommand("load", "Against tinyobjloader alone");
+    load->add_option("scene", scene, "OBJ file")->required();
+    load->add_option("--repeat", repeat, "Times, of which the best counts (default 5)");
+    load->callback([&] { afterglow::run_load(scene, repeat); });
     CLI::App* lookup = app.add_subcommand("lookup", "Functions where rays end: R-tree, hash grid, patch");
     lookup->add_option("scene", scene, "OBJ file or builtin:NAME")->required();
     lookup->callback([&] { afterglow::run_lookup(scene); });
