@@ -2,13 +2,14 @@
 
 #include "core/parallel.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Jacobi>
 
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
 #include <type_traits>
+#include <utility>
 
 namespace afterglow {
 namespace {
@@ -54,6 +55,48 @@ void add(std::vector<float>& y, const PerChannel& factor, const std::vector<floa
     });
 }
 
+/// The least squares problem of a channel, min |size e_0 - H y|, where H grows by a column a time: rotations make it
+/// triangular [Saad, Iterative Methods for Sparse Linear Systems, section 6.5.3]. O(k) for column k.
+class ArnoldiLeastSquares {
+public:
+    explicit ArnoldiLeastSquares(double size) : rest_{size} {}
+
+    /// Column k of k + 2 numbers, the last of which is not negative.
+    void append(std::vector<double> column) {
+        const std::size_t k = rotation_.size();
+        for (std::size_t j = 0; j < k; ++j) rotate(rotation_[j], column[j], column[j + 1]);
+        Rotation& last = rotation_.emplace_back(0.0, 1.0); // a column that is zero leaves unmet what was
+        if (column[k] != 0.0 || column[k + 1] != 0.0) last.makeGivens(column[k], column[k + 1]);
+        rotate(last, column[k], column[k + 1]);
+        rest_.push_back(0.0);
+        rotate(last, rest_[k], rest_[k + 1]);
+        column_.push_back(std::move(column));
+    }
+    double residual() const { return std::abs(rest_.back()); }
+    /// y; zero where a column adds nothing.
+    std::vector<double> solution() const {
+        std::vector<double> y(rest_.begin(), rest_.end() - 1);
+        for (std::size_t k = y.size(); k-- > 0;) {
+            const double pivot = column_[k][k];
+            y[k] = pivot != 0.0 ? y[k] / pivot : 0.0;
+            for (std::size_t j = 0; j < k; ++j) y[j] -= y[k] * column_[k][j];
+        }
+        return y;
+    }
+
+private:
+    using Rotation = Eigen::JacobiRotation<double>;
+    static void rotate(const Rotation& r, double& a, double& b) {
+        const double first = r.c() * a - r.s() * b;
+        b = r.s() * a + r.c() * b;
+        a = first;
+    }
+
+    std::vector<std::vector<double>> column_; // of the triangle
+    std::vector<Rotation> rotation_;
+    std::vector<double> rest_; // the right hand side, rotated; its last number is what is not met
+};
+
 /// 1 / x where x is not zero.
 PerChannel inverse(const PerChannel& x) { return (x > 0.0).select(1.0 / x.max(1e-300), 0.0); }
 
@@ -75,33 +118,27 @@ KrylovResult solve_second_kind(
     std::vector<float> q(b.size(), 0.0f);
     add(q, inverse(size), first, channels);
     basis.push_back(std::move(q));
-    std::array<Eigen::MatrixXd, most_channels> hessenberg;
-    for (auto& h : hessenberg) h = Eigen::MatrixXd::Zero(most_products + 1, most_products);
-    std::array<Eigen::VectorXd, most_channels> coefficient;
+    std::vector<ArnoldiLeastSquares> problem; // a channel each
+    for (int c = 0; c < channels; ++c) problem.emplace_back(size[c]);
 
     for (int k = 0; k < most_products; ++k) {
         // Arnoldi for A = I - K: w = q_k - K q_k, made orthogonal to all before (modified Gram-Schmidt).
         std::vector<float> w = basis[k];
         add(w, PerChannel::Constant(-1.0), apply(basis[k]), channels);
         ++result.products;
+        std::vector<PerChannel> column;
         for (int j = 0; j <= k; ++j) {
-            const PerChannel h = dot(basis[j], w, channels);
-            for (int c = 0; c < channels; ++c) hessenberg[c](j, k) = h[c];
-            add(w, -h, basis[j], channels);
+            column.push_back(dot(basis[j], w, channels));
+            add(w, -column.back(), basis[j], channels);
         }
         const PerChannel norm = dot(w, w, channels).sqrt();
+        column.push_back(norm);
         result.residual = 0.0;
         for (int c = 0; c < channels; ++c) {
-            hessenberg[c](k + 1, k) = norm[c];
-            if (size[c] <= 0.0) {
-                coefficient[c] = Eigen::VectorXd::Zero(k + 1);
-                continue;
-            }
-            const auto h = hessenberg[c].topLeftCorner(k + 2, k + 1);
-            Eigen::VectorXd rhs = Eigen::VectorXd::Zero(k + 2);
-            rhs[0] = size[c];
-            coefficient[c] = h.colPivHouseholderQr().solve(rhs);
-            result.residual = std::max(result.residual, (rhs - h * coefficient[c]).norm() / size[c]);
+            std::vector<double> of_channel;
+            for (const PerChannel& h : column) of_channel.push_back(h[c]);
+            problem[c].append(std::move(of_channel));
+            if (size[c] > 0.0) result.residual = std::max(result.residual, problem[c].residual() / size[c]);
         }
         if (result.residual <= tolerance || norm.maxCoeff() <= 0.0) break;
         if (k + 1 == most_products) break;
@@ -109,12 +146,12 @@ KrylovResult solve_second_kind(
         add(next, inverse(norm), w, channels);
         basis.push_back(std::move(next));
     }
-    for (std::size_t j = 0; j < basis.size(); ++j) {
-        PerChannel factor = PerChannel::Zero();
-        for (int c = 0; c < channels; ++c)
-            if (static_cast<Index>(j) < coefficient[c].size()) factor[c] = coefficient[c][j];
-        add(result.solution, factor, basis[j], channels);
+    std::vector<PerChannel> factor(basis.size(), PerChannel::Zero());
+    for (int c = 0; c < channels; ++c) {
+        const std::vector<double> y = problem[c].solution();
+        for (std::size_t j = 0; j < y.size(); ++j) factor[j][c] = y[j];
     }
+    for (std::size_t j = 0; j < basis.size(); ++j) add(result.solution, factor[j], basis[j], channels);
     return result;
 }
 
