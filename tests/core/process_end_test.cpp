@@ -21,6 +21,7 @@ namespace {
 
 /// Half of a file, and no more of it for a minute.
 void write_half(const std::string& path, int signal) {
+    if (signal != SIGKILL) std::signal(signal, SIG_DFL); // whoever runs this may ignore it (nohup)
     prepare_process("writer");
     const AtEarlyEnd note([] {}, "so it was");
     write_atomically(path, [&](OutputFile& file) {

@@ -146,7 +146,7 @@ TEST(Verification, TellsAGoodOperatorFromOneThatIsOff) {
     EXPECT_LT(good.rel_rmse, 0.1); // it has few functions and rays
     EXPECT_EQ(good.rel_rmse, again.rel_rmse);
     EXPECT_GE(good.worst, good.rel_rmse);
-    EXPECT_LE(good.worst, std::sqrt(3.0) * good.rel_rmse);
+    EXPECT_LE(good.worst, (1.0 + 1e-12) * std::sqrt(3.0) * good.rel_rmse); // equal where one light makes all of it
     EXPECT_LT(good.reference_error, 0.1);
     // Walls that reflect 0.4 instead of 0.5: an indirect bounce of a fifth less, and more of the others.
     box.transfer.points.reflectance *= 0.8f;
