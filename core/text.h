@@ -25,9 +25,14 @@ inline bool is_line_of_text(std::string_view text) {
            && std::ranges::none_of(text, [](unsigned char c) { return c < 32 || c == 127; });
 }
 
+/// A number without the "+" before it, which from_chars() does not know; with it where another sign follows.
+inline std::string_view without_plus(std::string_view text) {
+    return text.starts_with('+') && !text.starts_with("+-") ? text.substr(1) : text;
+}
+
 /// Reads a text that is a finite number as a whole, "+" before it or not; what is too small for a float is zero.
 inline bool parse_finite(std::string_view text, float& value) {
-    if (text.starts_with('+')) text.remove_prefix(1);
+    text = without_plus(text);
     const char* const last = text.data() + text.size();
     std::from_chars_result read = std::from_chars(text.data(), last, value);
     if (read.ec == std::errc::result_out_of_range) {

@@ -15,7 +15,7 @@ namespace {
 
 template <class Number>
 bool parse(std::string_view text, Number& value) {
-    if (text.starts_with('+')) text.remove_prefix(1);
+    text = without_plus(text);
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     return error == std::errc{} && end == text.data() + text.size();
 }

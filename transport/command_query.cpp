@@ -26,6 +26,7 @@ void run(QueryCommand& command) {
     check_outputs({command.output}, {command.file, command.points, command.scene});
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
+    check_outputs({command.output}, {opened.scene.name});
     if (!command.run.quiet) tell_of_outside_files(opened.scene);
     const Spotlight light = command.light.off_surfaces(opened.surface);
     const VectorIrradiance field = opened.transport.indirect(light);

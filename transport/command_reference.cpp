@@ -124,7 +124,7 @@ void run(ReferenceCommand& command, bool has_camera) {
         std::fprintf(stderr, "relative standard error %.3g %% (%.3g paths, %.3g rays, %s)\n",
                      100.0 * achieved.relative_error, static_cast<double>(achieved.samples),
                      static_cast<double>(achieved.rays), duration_text(achieved.seconds).c_str());
-    if (command.target_error > 0.0 && achieved.relative_error > command.target_error)
+    if (!command.run.quiet && command.target_error > 0.0 && achieved.relative_error > command.target_error)
         std::fprintf(stderr, "afterglow: warning: the target error of %.3g %% was not reached: so many paths are the most\n",
                      100.0 * command.target_error);
 }
@@ -163,6 +163,8 @@ void add_reference_command(CLI::App& app) {
     sub->add_option("--report", command->report, "JSON file for samples, rays, time and error")->type_name("FILE");
     add_light_options(*sub, command->light);
     add_camera_options(*sub, command->camera, false); // --points in their place
+    for (CLI::Option* option : sub->get_options())
+        if (option->get_group() == "Camera") option->excludes(points);
     add_run_options(*sub, command->run);
     add_seed_option(*sub, command->run);
     sub->callback([sub, command] {

@@ -57,6 +57,7 @@ void run(RenderCommand& command) {
     check_picture(command.output, command.camera.width, command.camera.height);
     const ThreadLimit limit(command.run.threads);
     const TransferScene opened(command.file, command.scene);
+    check_outputs({command.output}, {opened.scene.name});
     if (!command.run.quiet) tell_of_outside_files(opened.scene);
 
     const auto start = Clock::now();

@@ -15,13 +15,17 @@
 namespace afterglow {
 namespace {
 
-/// A first line none of whose fields is a number.
-bool is_header(std::string_view line) {
-    for (;;) {
+/// A first line of so many names, not numbers.
+bool is_header(std::string_view line, std::size_t columns) {
+    for (std::size_t c = 1;; ++c) {
         const auto comma = line.find(',');
+        const std::string_view name = trimmed(line.substr(0, comma));
+        constexpr std::string_view of_numbers = "+-.0123456789";
+        if (name.empty() || of_numbers.find(name[0]) != std::string_view::npos) return false;
         float value = 0.0f;
-        if (parse_finite(trimmed(line.substr(0, comma)), value)) return false;
-        if (comma == std::string_view::npos) return true;
+        if (std::from_chars(name.data(), name.data() + name.size(), value).ptr == name.data() + name.size())
+            return false; // nan, inf
+        if (comma == std::string_view::npos) return c == columns;
         line.remove_prefix(comma + 1);
     }
 }
@@ -37,7 +41,7 @@ void read_rows(const std::string& path, const char* names, const Use& use) {
         std::string_view rest = trimmed(text);
         if (rest.starts_with(byte_order_mark)) rest.remove_prefix(byte_order_mark.size());
         if (rest.empty()) continue;
-        if (std::exchange(first, false) && is_header(rest)) continue;
+        if (std::exchange(first, false) && is_header(rest, columns)) continue;
         const std::string where = "line " + std::to_string(number) + ": ";
         std::array<float, columns> row{};
         for (std::size_t c = 0; c < columns; ++c) {

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "core/seconds.h"
+#include "transport/provenance.h"
 #include "viewer/frame_path.h"
 #include "viewer/gl_context.h"
 #include "viewer/light_solver.h"
@@ -40,7 +41,7 @@ std::string frame_name(std::size_t k, const std::string& format) {
 }
 
 /// All frames once, and their timings.
-Json draw_round(const std::vector<Frame>& frames, Renderer& renderer, LightSolver& solver,
+Json draw_round(const std::vector<Frame>& frames, const Gl& gl, Renderer& renderer, LightSolver& solver,
                 const HeadlessOptions& options) {
     Json timings = Json::array();
     for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -52,6 +53,8 @@ Json draw_round(const std::vector<Frame>& frames, Renderer& renderer, LightSolve
             light = solver.statistics();
         }
         const Image picture = renderer.average(frame.camera, options.layer, options.samples);
+        if (const std::vector<std::string>& errors = gl.errors(); !errors.empty())
+            throw Error("OpenGL: " + errors.front());
         const std::string name = frame_name(k, options.format);
         write_image((std::filesystem::path(options.folder) / name).string(), picture,
                     PixelType::half_float,
@@ -76,6 +79,8 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
         frame.light = frame.light.off_surfaces(scene.surface);
     }
     make_folder(options.folder);
+    const std::string timings_file = (std::filesystem::path(options.folder) / "timings.json").string();
+    check_outputs({timings_file}, {options.frames});
 
     const std::unique_ptr<GlContext> context = make_offscreen_context(options.context);
     Renderer renderer(context->gl(), scene, options.method);
@@ -84,10 +89,8 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
     int rounds = 0;
     Json timings;
     do {
-        timings = draw_round(frames, renderer, solver, options);
+        timings = draw_round(frames, context->gl(), renderer, solver, options);
         ++rounds;
-        const std::vector<std::string>& errors = context->gl().errors();
-        if (!errors.empty()) throw Error("OpenGL: " + errors.front());
     } while (seconds_since(start) < options.seconds);
 
     const Json report = {{"version", AFTERGLOW_VERSION},
@@ -100,7 +103,7 @@ void draw_frames(const TransferScene& scene, const HeadlessOptions& options) {
                          {"rounds", rounds},
                          {"unit", "ms"},
                          {"frames", timings}};
-    write_file((std::filesystem::path(options.folder) / "timings.json").string(), report.dump(1) + "\n");
+    write_file(timings_file, report.dump(1) + "\n");
 }
 
 } // namespace afterglow

@@ -65,6 +65,7 @@ void open_window(const CLI::App& app, const ViewCommand& command) {
         if (app.count(option) > 0) throw UsageError(std::string(option) + " is of --headless");
     if (frames.context != "auto" && frames.context != "glfw")
         throw UsageError("--context " + frames.context + " has no window; give --headless");
+    if (is_scene(command.file) && !command.scene.empty()) throw UsageError("--scene is of transfer files");
     ViewerOptions options;
     options.file = command.file;
     options.scene = command.scene;
@@ -74,6 +75,7 @@ void open_window(const CLI::App& app, const ViewCommand& command) {
     options.width = frames.width;
     options.height = frames.height;
     options.exposure = frames.exposure;
+    options.threads = command.threads;
     if (!frames.folder.empty()) {
         make_folder(frames.folder);
         options.folder = frames.folder;

@@ -8,7 +8,11 @@
 namespace afterglow {
 namespace {
 
-ImVec2 at(const Vec2& p) { return {p.x(), p.y()}; }
+/// Where ImGui has a pixel: its units are the window's, which may be several pixels wide.
+ImVec2 at(const Vec2& p) {
+    const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    return {p.x() / scale.x, p.y() / scale.y};
+}
 
 /// Red for positive, blue for negative, white about zero; `x` from -1 to 1.
 ImU32 signed_colour(float x) {

@@ -31,26 +31,34 @@ std::string program() {
 
 } // namespace
 
-PrecomputeTask::PrecomputeTask(const std::string& scene, const std::string& file)
+PrecomputeTask::PrecomputeTask(const std::string& scene, const std::string& file, int threads)
     : file_(file), start_(clock_seconds()) {
-    // A terminal of its own, to which it tells its progress as it would to a person's.
+    // A terminal of its own, to which it tells its progress as it would to a person's; as its controlling one, so that
+    // it is hung up (SIGHUP) where this process is gone, however that came.
     const int here = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
     const char* name = here >= 0 && grantpt(here) == 0 && unlockpt(here) == 0 ? ptsname(here) : nullptr;
-    const int there = name ? open(name, O_RDWR | O_NOCTTY | O_CLOEXEC) : -1;
-    if (there < 0) {
+    if (!name) {
         const std::string why = std::strerror(errno);
         if (here >= 0) close(here);
         throw Error("no terminal for the precomputation: " + why);
     }
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, there, STDERR_FILENO);
-    const std::string path = program();
-    const std::array<const char*, 6> words = {path.c_str(), "precompute", scene.c_str(), "-o", file.c_str(), nullptr};
-    const int failure = posix_spawnp(&process_, path.c_str(), &actions, nullptr,
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, name, O_RDWR, 0);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGDEF);
+    sigset_t followed;
+    sigemptyset(&followed);
+    sigaddset(&followed, SIGHUP);
+    posix_spawnattr_setsigdefault(&attributes, &followed);
+    const std::string path = program(), count = std::to_string(threads);
+    const std::array<const char*, 8> words = {path.c_str(), "precompute", scene.c_str(), "-o", file.c_str(),
+                                              "--threads", count.c_str(), nullptr};
+    const int failure = posix_spawnp(&process_, path.c_str(), &actions, &attributes,
                                      const_cast<char**>(words.data()), environ);
+    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
-    close(there);
     output_ = here;
     if (failure != 0) {
         close(output_);
@@ -92,6 +100,9 @@ PrecomputeTask::State PrecomputeTask::state() {
     if (waitpid(process_, &status, WNOHANG) != process_) return state_;
     read_output();
     state_ = WIFEXITED(status) && WEXITSTATUS(status) == 0 ? State::done : State::failed;
+    constexpr std::string_view own = "afterglow: "; // it is told by this program
+    if (message_.starts_with(own)) message_.erase(0, own.size());
+    if (WIFSIGNALED(status)) message_ = "the precomputation was killed by signal " + std::to_string(WTERMSIG(status));
     return state_;
 }
 

@@ -7,15 +7,15 @@
 
 namespace afterglow {
 
-/// `afterglow precompute` at work in a process of its own: it can be stopped at any time, and its file
-/// appears whole or not at all.
+/// `afterglow precompute` at work in a process of its own: it can be stopped at any time, ends with this one however
+/// that ends, and its file appears whole or not at all.
 class PrecomputeTask {
 public:
     enum class State { at_work, done, failed };
 
-    /// Starts it; the program lies beside this one, or where PATH says. Throws Error where it cannot be
-    /// started.
-    PrecomputeTask(const std::string& scene, const std::string& file);
+    /// Starts it; the program lies beside this one, or where PATH says. `threads`: 0 for all processors. Throws Error
+    /// where it cannot be started.
+    PrecomputeTask(const std::string& scene, const std::string& file, int threads = 0);
     /// Stops it.
     ~PrecomputeTask();
     PrecomputeTask(const PrecomputeTask&) = delete;

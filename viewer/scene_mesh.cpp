@@ -41,6 +41,27 @@ Vertex vertex(const Scene& scene, std::uint32_t t, int corner) {
     return v;
 }
 
+/// The texture, or means over its texels where OpenGL takes no picture of its size.
+Texture fitted(const Texture& texture, int most) {
+    Texture small{std::min(texture.width, most), std::min(texture.height, most), {}};
+    small.rgb.reserve(3 * static_cast<std::size_t>(small.width) * static_cast<std::size_t>(small.height));
+    const auto start = [](int k, int of, int size) { // of what becomes texel k of so many
+        return static_cast<int>(static_cast<std::int64_t>(k) * size / of);
+    };
+    for (int y = 0; y < small.height; ++y)
+        for (int x = 0; x < small.width; ++x) {
+            const int left = start(x, small.width, texture.width), right = start(x + 1, small.width, texture.width);
+            const int low = start(y, small.height, texture.height), high = start(y + 1, small.height, texture.height);
+            Rgb sum = Rgb::Zero();
+            for (int row = low; row < high; ++row)
+                for (int column = left; column < right; ++column)
+                    sum += Rgb::Map(&texture.rgb[3 * (static_cast<std::size_t>(row) * texture.width + column)]);
+            sum /= static_cast<float>((right - left) * (high - low));
+            small.rgb.insert(small.rgb.end(), sum.data(), sum.data() + 3);
+        }
+    return small;
+}
+
 } // namespace
 
 SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
@@ -100,8 +121,13 @@ SceneMesh::SceneMesh(const Gl& gl, const Scene& scene)
 }
 
 std::vector<GlName> SceneMesh::upload(const std::vector<Texture>& textures) const {
+    GLint most = 0;
+    gl_.GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
     std::vector<GlName> names;
-    for (const Texture& texture : textures) {
+    for (const Texture& whole : textures) {
+        Texture small;
+        const bool fits = std::max(whole.width, whole.height) <= most;
+        const Texture& texture = fits ? whole : small = fitted(whole, most);
         names.push_back(make_texture(gl_, {GL_RGB16F, GL_RGB, GL_FLOAT}, texture.width,
                                          texture.height, texture.rgb.data()));
         // As Texture::sample: bilinear, repeated. Row 0 is at v = 0 in both.

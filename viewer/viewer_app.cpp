@@ -30,6 +30,8 @@ void remember(std::vector<float>& values, double seconds) {
 
 } // namespace
 
+bool is_scene(const std::string& path) { return path.ends_with(".obj") || path.ends_with(".OBJ"); }
+
 ViewerApp::ViewerApp(const ViewerOptions& options)
     : options_(options), window_(options.width, options.height, "Afterglow"), gui_(window_),
       layer_(options.layer), exposure_(options.exposure) {
@@ -49,9 +51,9 @@ void ViewerApp::attempt(const Work& work) {
 }
 
 void ViewerApp::open(const std::string& path) {
-    if (path.ends_with(".obj") || path.ends_with(".OBJ")) {
-        precompute_ = std::make_unique<PrecomputeTask>(
-            path, free_name(std::filesystem::path(path).stem().string(), ".afterglow", false));
+    if (is_scene(path)) {
+        const std::string name = free_name(std::filesystem::path(path).stem().string(), {".afterglow"}, false);
+        precompute_ = std::make_unique<PrecomputeTask>(path, name + ".afterglow", options_.threads);
         return;
     }
     attempt([&] { // the window stays with what it has
@@ -73,10 +75,12 @@ void ViewerApp::set_light(const Spotlight& light) {
 
 void ViewerApp::connect_events() {
     window_.events.key = [this](int key, bool, bool) {
-        if (key == GLFW_KEY_ESCAPE)
+        if (ImGui::GetIO().WantTextInput) return;
+        if (key != GLFW_KEY_ESCAPE) {
+            if (session_) on_key(key);
+        } else if (!ImGui::IsPopupOpen(nullptr, ImGuiPopupFlags_AnyPopup)) {
             window_.close();
-        else if (session_ && !ImGui::GetIO().WantTextInput)
-            on_key(key);
+        }
     };
     window_.events.button = [this](int button, bool pressed, bool shift, bool control) {
         if (session_ && (!pressed || !ImGui::GetIO().WantCaptureMouse)) on_button(button, pressed, shift, control);
@@ -154,7 +158,7 @@ void ViewerApp::on_button(int button, bool pressed, bool shift, bool control) {
     if (button == GLFW_MOUSE_BUTTON_LEFT && overlay_ == Overlay::links && !shift && !control && under)
         session_->overlays.pick(overlay_level_, *under);
     if (button == GLFW_MOUSE_BUTTON_LEFT)
-        drag_ = shift || grabs_light(pointer_) ? Drag::move_light : control ? Drag::aim_light : Drag::orbit;
+        drag_ = control ? Drag::aim_light : shift || grabs_light(pointer_) ? Drag::move_light : Drag::orbit;
     else if (button == GLFW_MOUSE_BUTTON_RIGHT)
         drag_ = shift ? Drag::aim_light : Drag::look;
     else
@@ -221,7 +225,7 @@ void ViewerApp::toggle_recording() {
         return;
     }
     recording_since_.reset();
-    const std::string file = free_name("path", ".json");
+    const std::string file = free_name("path", {".json"}) + ".json";
     write_frame_path(file, path_);
     message_ = "wrote " + file + ", " + std::to_string(path_.size()) + " frames; space plays it";
 }
@@ -243,25 +247,27 @@ void ViewerApp::play() {
     if (time >= path_.back().time) playing_since_.reset();
 }
 
-std::string ViewerApp::free_name(const std::string& stem, const std::string& ending, bool always_numbered) const {
+std::string ViewerApp::free_name(const std::string& stem, std::initializer_list<const char*> endings,
+                                 bool always_numbered) const {
     for (int k = 0;; ++k) {
         std::string file = stem;
         if (k > 0 || always_numbered) file.append("_").append(std::to_string(k));
-        const std::string name = (std::filesystem::path(options_.folder) / (file + ending)).string();
-        if (!std::filesystem::exists(name)) return name;
+        const std::string name = (std::filesystem::path(options_.folder) / file).string();
+        if (std::ranges::none_of(endings, [&](const char* ending) { return std::filesystem::exists(name + ending); }))
+            return name;
     }
 }
 
 void ViewerApp::write_picture() {
-    const std::string png = free_name("picture", ".png");
+    const std::string name = free_name("picture", {".png", ".exr"});
     const Image image = session_->renderer.read();
     Image shown = image; // as the window shows it
     if (is_light(layer_) && !tone_mapped_)
         for (float& value : shown.rgb) value *= exposure_;
-    write_image(png, shown, PixelType::half_float,
+    write_image(name + ".png", shown, PixelType::half_float,
                 is_light(layer_) && tone_mapped_ ? std::optional(exposure_) : std::nullopt);
-    write_image(png.substr(0, png.size() - 4) + ".exr", image, PixelType::full_float);
-    message_ = "wrote " + png + " and .exr";
+    write_image(name + ".exr", image, PixelType::full_float);
+    message_ = "wrote " + name + ".png and .exr";
 }
 
 void ViewerApp::write_screenshot(const std::string& name) {
@@ -356,7 +362,7 @@ void ViewerApp::draw_window() {
     }
     gui_.end();
     if (picture_wanted_) attempt([&] { write_picture(); });
-    if (screenshot_wanted_) attempt([&] { write_screenshot(free_name("window", ".png")); });
+    if (screenshot_wanted_) attempt([&] { write_screenshot(free_name("window", {".png"}) + ".png"); });
     picture_wanted_ = screenshot_wanted_ = false;
     window_.swap();
 }
@@ -401,14 +407,16 @@ void ViewerApp::draw_view_panel() {
     picture_is_old_ |= ImGui::Checkbox("tone map", &tone_mapped_);
     ImGui::SameLine(100.0f);
     ImGui::SetNextItemWidth(120.0f);
-    picture_is_old_ |= ImGui::SliderFloat("exposure", &exposure_, 0.01f, 10.0f, "%.3f", ImGuiSliderFlags_Logarithmic);
+    picture_is_old_ |= ImGui::SliderFloat("exposure", &exposure_, 0.01f, 10.0f, "%.3f",
+                                         ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
     int overlay = static_cast<int>(overlay_);
     ImGui::SetNextItemWidth(120.0f);
     ImGui::Combo("over it", &overlay, "nothing\0points\0coefficients\0links of a function\0");
     overlay_ = static_cast<Overlay>(overlay);
     if (overlay_ != Overlay::none) {
         ImGui::SetNextItemWidth(120.0f);
-        ImGui::SliderInt("level", &overlay_level_, 0, session_->scene.file.transfer.points.levels() - 1);
+        ImGui::SliderInt("level", &overlay_level_, 0, session_->scene.file.transfer.points.levels() - 1, "%d",
+                         ImGuiSliderFlags_AlwaysClamp);
     }
     int method = static_cast<int>(session_->renderer.method());
     ImGui::SetNextItemWidth(120.0f);
@@ -425,8 +433,13 @@ void ViewerApp::draw_light_panel() {
     changed |= ImGui::DragFloatRange2("cone", &light.inner_angle, &light.outer_angle, 0.5f, 0.0f, 180.0f, "%.1f");
     float brightness = light.intensity.maxCoeff();
     Rgb colour = brightness > 0.0f ? Rgb(light.intensity / brightness) : Rgb::Ones();
-    changed |= ImGui::DragFloat("W/sr", &brightness, 0.01f * std::max(brightness, 0.01f), 0.0f, 1e9f, "%.4g");
-    changed |= ImGui::ColorEdit3("colour", colour.data(), ImGuiColorEditFlags_Float);
+    changed |= ImGui::DragFloat("W/sr", &brightness, 0.01f * std::max(brightness, 0.01f), 0.0f, 1e9f, "%.4g",
+                                ImGuiSliderFlags_AlwaysClamp);
+    Rgb picked = colour;
+    if (ImGui::ColorEdit3("colour", picked.data(), ImGuiColorEditFlags_Float) && picked.maxCoeff() > 0.0f) {
+        colour = picked / picked.maxCoeff(); // how bright it is, is said above
+        changed = true;
+    }
     if (!changed) return;
     light.intensity = brightness * colour;
     try {

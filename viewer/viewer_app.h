@@ -7,6 +7,7 @@
 #include "viewer/session.h"
 
 #include <array>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,7 +24,11 @@ struct ViewerOptions {
     int width = 1280, height = 720;
     float exposure = 0.18f;
     std::string folder = "."; // of pictures, recorded paths and transfer files
+    int threads = 0;          // of a precomputation, 0: all processors
 };
+
+/// Whether a file is a scene, not a transfer file.
+bool is_scene(const std::string& path);
 
 /// The window: a scene to walk through, a light to hold. docs/viewer.md says what a person can do.
 class ViewerApp {
@@ -103,8 +108,9 @@ private:
     void draw_times_panel();
     void draw_file_panel();
     void draw_precompute_panel();
-    /// A name in the folder that no file has: of STEM ENDING, with a number between where need be, or always.
-    std::string free_name(const std::string& stem, const std::string& ending, bool always_numbered = true) const;
+    /// A name in the folder that no file has with one of these endings: STEM, with a number where need be, or always.
+    std::string free_name(const std::string& stem, std::initializer_list<const char*> endings,
+                          bool always_numbered = true) const;
 };
 
 } // namespace afterglow

@@ -98,6 +98,8 @@ TEST(CommandLine, LosesNoFileToAnother) {
           "reference builtin:cornell --quiet --points '" + points + "' -o '" + points + "'" + light,
           "reference builtin:cornell --quiet -o '" + one + ".exr' --report '" + one + ".exr'" + light + camera,
           "query '" + scene + "' --points '" + points + "' -o '" + scene + "'" + light,
+          "reference builtin:cornell --quiet --points '" + points + "' -o '" + one + "' --camera-fov 40" + light,
+          "reference builtin:cornell --quiet --points '" + points + "' -o '" + one + "' --target-error +-0.1" + light,
           "render '" + scene + "' -o '" + one + ".jpg'" + light + camera,
           "reference builtin:cornell -o '" + one + ".jpg'" + light + camera,
           "precompute '" + folder.path("caf\xe9.obj") + "'" + draft + one + "'",

@@ -259,6 +259,13 @@ TEST_F(CommandTransfer, AnEditedMaterialOrTextureIsRefusedByEveryCommand) {
     expect_refusal("a texture that is gone");
     write_texture("abc");
     EXPECT_EQ(run(query).status, 0) << "all is as it was";
+
+    // The scene that a transfer file names is read, too.
+    const std::string scene = content_of(folder.path("a.obj"));
+    for (const std::string& command : {"query" + quoted(folder.path("t")) + " --points" + quoted(folder.path("p.csv")) + light,
+                                       "render" + quoted(folder.path("t")) + light + camera})
+        EXPECT_EQ(run(command + " --quiet -o" + quoted(folder.path("./a.obj"))).status, 2);
+    EXPECT_EQ(content_of(folder.path("a.obj")), scene);
 }
 
 TEST_F(CommandTransfer, RenderMakesEachLayerWithItsProvenance) {

@@ -52,6 +52,9 @@ TEST(CsvPoints, FaultsAreNamedWithTheirLine) {
         EXPECT_NE(complaint(good + bad).find("points.csv: line 3: "), std::string::npos) << bad;
     }
     EXPECT_NE(complaint("x,y,z,nx,ny,nz\n").find("no points"), std::string::npos);
+    // Not taken for a header.
+    for (const char* bad : {"0.1;0;0.1;0;1;0", "nan,nan,nan,nan,nan,nan", "+x,y,z,0,0,1", "x,y,z", "-,-,-,-,-,-"})
+        EXPECT_NE(complaint(std::string(bad) + "\n1,2,3,0,0,1\n").find("points.csv: line 1: "), std::string::npos) << bad;
     EXPECT_NE(complaint("").find("no points"), std::string::npos);
     EXPECT_THROW(read_points_csv("/nonexistent/points.csv"), FileError);
 }

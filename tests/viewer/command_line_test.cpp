@@ -102,6 +102,9 @@ TEST(CommandLine, SaysInOneLineWhatIsWrong) {
     expect_one_line(run(open + draw), 1, "path.json");
     files.folder.write("path.json", path_text);
     expect_one_line(run(open + " --headless -o out"), 2, "--frames");
+    files.folder.write("timings.json", path_text);
+    expect_one_line(run(open + " --headless --frames '" + files.folder.path("timings.json") + "' -o '" + files.folder.path("") + "'"), 2, "timings.json");
+    expect_one_line(run("room.obj --scene other.obj"), 2, "--scene");
     expect_one_line(run(open + draw + "--context glfw"), 2, "no window");
     expect_one_line(run(open + draw + "--indirect magic"), 2, "splat, gather or auto");
     expect_one_line(run(open + draw + "--layer depth"), 2, "reflectance");

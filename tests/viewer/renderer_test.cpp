@@ -244,6 +244,35 @@ TEST_P(OnContext, NormalMapsAreThoseOfTheRendererOnTheCpu) {
     EXPECT_GT(difference(gathered, render_picture(flat_surface, flat_display, field, light, camera, Layer::indirect, 1).image), 0.05);
 }
 
+TEST_P(OnContext, TexturesLargerThanOpenGlTakesAreShownSmaller) {
+    static const TemporaryFolder folder;
+    GLint most = 0;
+    context->gl().GetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+    const int width = most + most / 4;
+    std::vector<unsigned char> halves; // red on the left, green on the right
+    for (int y = 0; y < 2; ++y)
+        for (int x = 0; x < width; ++x)
+            for (int c = 0; c < 3; ++c) halves.push_back(c == (2 * x < width ? 0 : 1) ? 200 : 0);
+    write_png_bytes(folder.path("halves.png"), width, 2, halves);
+    folder.write("room.mtl", "newmtl floor\nmap_Kd halves.png\nnewmtl plain\nKd 0.6 0.6 0.6\n");
+    const TransferScene& scene = opened(folder.write("room.obj",
+        "mtllib room.mtl\nv 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 0 3 0\nv 4 3 0\nv 4 3 4\nv 0 3 4\n"
+        "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl floor\nf 1/1 4/4 3/3 2/2\n"
+        "usemtl plain\nf 1 2 6 5\nf 5 6 7 8\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"));
+    Renderer renderer(context->gl(), scene, IndirectMethod::gather);
+    const Camera down{.position = {2.0f, 2.9f, 2.0f}, .target = {2.0f, 0.0f, 2.0f}, .up = {0.0f, 0.0f, 1.0f},
+                      .vertical_fov = 50.0f, .width = 60, .height = 60};
+    renderer.draw(down, ViewLayer::reflectance);
+    const Image seen = renderer.read();
+    for (int y = 0; y < seen.height; ++y)
+        for (int x = 0; x < seen.width; ++x) {
+            if (std::abs(x - seen.width / 2) < 2) continue;
+            const Hit hit = scene.surface.closest_hit(
+                {down.position, down.direction(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f)});
+            EXPECT_LT((seen.pixel(x, y) - scene.surface.reflectance(hit)).abs().maxCoeff(), 1e-3f) << x << " " << y;
+        }
+}
+
 TEST_P(OnContext, APictureGetsBetterWhileItIsDrawnAgain) {
     const TransferScene& scene = opened(cornell);
     LightSolver solver(scene, 0);
