@@ -307,7 +307,7 @@ private:
             return true;
         });
         if (conflict) return false;
-        std::swap(near[0], near[closest]);
+        if (count > 0) std::swap(near[0], near[closest]);
         const std::span<const Near> found(near.data(), count);
         // What differs by less than half of what is asked for with half of the rays is not looked at with all.
         if (!feature->first_half) feature->first_half = probe_.first_half(x);

@@ -40,7 +40,8 @@ PushOperator make_push_operator(const ShepardBasis& basis);
 /// loses some, or gains, where functions are unlike in size.)
 struct PullOperator {
     /// A row a function of all levels but the finest: its children c on the next finer level with
-    /// <B_k, B_c> / <B_k, 1>. A function with an empty row keeps its own value.
+    /// <B_k, B_c> / <B_k, 1>; those of a thousandth of the row or less are left to the others. A function with an
+    /// empty row keeps its own value.
     SparseRows<float> children;
 
     /// For the levels [0, levels), in place; `channels` numbers a point.

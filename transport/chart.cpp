@@ -114,6 +114,7 @@ ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
                 taken = seconds_since(start);
                 least = std::min(least, taken);
             }
+            if (!(estimate.indirect > 0.0f).any()) continue; // a light that shines out of the scene
             point.seconds += least;
             point.rays += estimate.rays;
             squares += estimate.relative_error[0] * estimate.relative_error[0];
@@ -122,8 +123,10 @@ ChartPoint ChartBench::measure_paths(const ChartSetting& setting) const {
             ++lights;
         }
     constexpr double pixels = 1280.0 * 720.0;
-    point.seconds *= pixels / traced;
-    point.error.rel_rmse = std::sqrt(squares / lights);
+    if (lights > 0) {
+        point.seconds *= pixels / traced;
+        point.error.rel_rmse = std::sqrt(squares / lights);
+    }
     point.error.lights = chart_lights;
     point.error.places = chart_places;
     return point;

@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <map>
@@ -33,6 +34,7 @@ struct ReferenceCommand {
 struct Achieved {
     double relative_error = 0.0, seconds = 0.0;
     std::uint64_t samples = 0, rays = 0;
+    bool dark = false; // nothing was found
 };
 
 std::map<std::string, std::string> provenance(const ReferenceCommand& command, const Scene& scene,
@@ -72,7 +74,7 @@ Achieved trace_points(const ReferenceCommand& command, const Surface& surface,
     const IrradianceEstimate estimate =
         estimate_irradiance(surface, {&light, 1}, points, options);
     write_irradiance_csv(command.output, estimate.indirect);
-    return {estimate.relative_error[0], 0.0, estimate.samples, estimate.rays};
+    return {estimate.relative_error[0], 0.0, estimate.samples, estimate.rays, (estimate.indirect == 0.0f).all()};
 }
 
 Achieved trace_picture(const ReferenceCommand& command, const Surface& surface,
@@ -80,7 +82,8 @@ Achieved trace_picture(const ReferenceCommand& command, const Surface& surface,
     options.batches = 4; // a pixel has few samples, and a picture many pixels
     PictureEstimate estimate = render_reference(surface, command.light.off_surfaces(surface), command.camera,
                                                 layer_from_name(command.layer), options);
-    const Achieved achieved{estimate.relative_error, 0.0, estimate.samples, estimate.rays};
+    const bool dark = std::ranges::all_of(estimate.image.rgb, [](float value) { return value == 0.0f; });
+    const Achieved achieved{estimate.relative_error, 0.0, estimate.samples, estimate.rays, dark};
     estimate.image.attributes = provenance(command, surface.scene(), achieved);
     write_image(command.output, estimate.image, PixelType::full_float);
     return achieved;
@@ -124,6 +127,9 @@ void run(ReferenceCommand& command, bool has_camera) {
         std::fprintf(stderr, "relative standard error %.3g %% (%.3g paths, %.3g rays, %s)\n",
                      100.0 * achieved.relative_error, static_cast<double>(achieved.samples),
                      static_cast<double>(achieved.rays), duration_text(achieved.seconds).c_str());
+    if (!command.run.quiet && achieved.dark)
+        std::fprintf(stderr, "afterglow: warning: no path met the light%s\n",
+                     command.strategy == "plain" ? "; a narrow one is found sooner by --strategy connected" : "");
     if (!command.run.quiet && command.target_error > 0.0 && achieved.relative_error > command.target_error)
         std::fprintf(stderr, "afterglow: warning: the target error of %.3g %% was not reached: so many paths are the most\n",
                      100.0 * command.target_error);

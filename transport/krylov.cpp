@@ -5,7 +5,6 @@
 #include <Eigen/Jacobi>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <type_traits>
@@ -142,8 +141,12 @@ KrylovResult solve_second_kind(
         }
         if (result.residual <= tolerance || norm.maxCoeff() <= 0.0) break;
         if (k + 1 == most_products) break;
+        // Of a channel that is done, w is rounding: no direction that its solution could go on in.
+        PerChannel scale = inverse(norm);
+        for (int c = 0; c < channels; ++c)
+            if (problem[c].residual() <= tolerance * size[c]) scale[c] = 0.0;
         std::vector<float> next(b.size(), 0.0f);
-        add(next, inverse(norm), w, channels);
+        add(next, scale, w, channels);
         basis.push_back(std::move(next));
     }
     std::vector<PerChannel> factor(basis.size(), PerChannel::Zero());

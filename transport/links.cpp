@@ -424,7 +424,11 @@ GatherDirections gather_directions(const LinkOptions& options, const PointHierar
     return {gather_rays(options, points, level), hash64(options.seed, static_cast<std::uint64_t>(level))};
 }
 
-Links join_links(LinkRows rows) {
+namespace {
+
+/// done_with: is called after each row.
+template <class Rows>
+Links joined(Rows& rows, const auto& done_with) {
     std::vector<std::uint64_t> begin{0};
     for (const auto& row : rows)
         begin.push_back(begin.back() + row.size());
@@ -432,9 +436,19 @@ Links join_links(LinkRows rows) {
     entry.reserve(begin.back());
     for (auto& row : rows) {
         entry.insert(entry.end(), row.begin(), row.end());
-        std::vector<PackedLink>().swap(row);
+        done_with(row);
     }
     return {SharedArray(std::move(begin)), SharedArray(std::move(entry))};
+}
+
+} // namespace
+
+Links join_links(const LinkRows& rows) {
+    return joined(rows, [](const auto&) {});
+}
+
+Links join_links(LinkRows&& rows) {
+    return joined(rows, [](std::vector<PackedLink>& row) { std::vector<PackedLink>().swap(row); });
 }
 
 LinkRows make_links(const Surface& surface, const PointHierarchy& points, const PushOperator& push,

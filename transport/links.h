@@ -80,6 +80,7 @@ LinkRows make_links(const Surface& surface, const PointHierarchy& points, const 
                     LinkStatistics& statistics, const LinkResumption& resumption = {});
 
 /// Takes twice the memory of the rows for a while.
-Links join_links(LinkRows rows);
+Links join_links(LinkRows&& rows);
+Links join_links(const LinkRows& rows); // twice the memory
 
 } // namespace afterglow

@@ -92,6 +92,13 @@ private:
     std::uint64_t rays_ = 0;
 };
 
+/// Whether there is an output of which nothing was found.
+bool has_dark_output(const MeanEstimate& estimate, Index items, Index outputs) {
+    for (Index o = 0; o < outputs && items > 0; ++o)
+        if ((estimate.mean(Eigen::all, Eigen::seq(o, Eigen::last, outputs)) == 0.0f).all()) return true;
+    return false;
+}
+
 double worst(const std::vector<double>& errors) {
     return errors.empty() ? 0.0 : *std::max_element(errors.begin(), errors.end());
 }
@@ -143,6 +150,7 @@ MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
         return sums.estimate();
     }
 
+    constexpr double enough_for_darkness = 1 << 20; // samples in all
     constexpr int pilot_batches = 8;
     constexpr Index pilot_samples = 16; // a batch
     const MeanEstimate first = [&] {
@@ -176,8 +184,11 @@ MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
             progress(reached, expected));
         reached = expected;
         result = sums.estimate();
-        const double ratio = worst(result.relative_error) / options.target_error;
-        if (ratio <= 1.0 || samples >= static_cast<double>(options.max_samples)) break;
+        if (samples >= static_cast<double>(options.max_samples)) break;
+        double ratio = worst(result.relative_error) / options.target_error;
+        if (samples * static_cast<double>(items) < enough_for_darkness && has_dark_output(result, items, outputs))
+            ratio = std::max(ratio, 2.0); // so few may all have missed
+        if (ratio <= 1.0) break;
         samples = std::min(samples * std::clamp(1.05 * ratio * ratio, 1.1, 4.0),
                            static_cast<double>(options.max_samples));
     }

@@ -41,7 +41,8 @@ struct MeanEstimate {
 /// samples happened to be small would get few more of them and the means were biased) gives the
 /// standard deviation s_i of each item; N samples in all are shared out as n_i ~ s_i, which has the
 /// least sum of s_i^2 / n_i (Neyman 1934). N grows until the measured error is small enough; that
-/// this is decided by all items together is a bias far below the error itself.
+/// this is decided by all items together is a bias far below the error itself. An output of which nothing was found is
+/// given up for dark, with an error of zero, after 2^20 samples of all items.
 MeanEstimate estimate_means(Index items, Index outputs, const Sampler& sampler,
                             const EstimatorOptions& options);
 

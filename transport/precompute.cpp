@@ -96,9 +96,10 @@ void make_neumann(const Surface& surface, const LinkOptions& links, Checkpoint* 
     report.pull_seconds = seconds_since(start);
     if (checkpoint) {
         const auto save = [&](std::uint32_t done, const LinkRows& of_receivers) {
-            transfer.links = join_links(of_receivers);
+            transfer.links = join_links(of_receivers); // for this alone: they take as much as the rows
             transfer.sender_areas.assign(transfer.senders() - transfer.points.begin(transfer.sender_levels - 1), 0.0f);
             checkpoint->save(transfer, done, rows->made_numbers(), report);
+            transfer.links = {};
         };
         if (!begun) save(0, LinkRows(transfer.points.size()));
         resumption.pause = [=](std::uint32_t done, const LinkRows& of_receivers) {

@@ -86,6 +86,7 @@ Spotlight random_spotlight(const Surface& surface, FreePlaces& free) {
 
 /// Of one and more that are independent of each other.
 ErrorPart root_mean_square(const std::vector<ErrorPart>& parts) {
+    if (parts.empty()) return {};
     const auto count = static_cast<double>(parts.size());
     double squares = 0.0, variance = 0.0; // the latter of the former
     for (const ErrorPart& part : parts) {
@@ -234,9 +235,10 @@ VerifiedError Verifier::error_of(const TransferOperator& transfer) const {
 }
 
 ErrorParts Verifier::parts_of(const TransferOperator& transfer, const ErrorPartsOptions& options) const {
-    std::vector<ErrorParts> parts;
+    std::vector<ErrorParts> parts; // of trials in which a light shows
     for (std::size_t t = 0; t < trials_.size(); ++t)
-        parts.push_back(error_parts(surface_, transfer, trials_[t], references_[t], options));
+        if ((references_[t].indirect > 0.0f).any())
+            parts.push_back(error_parts(surface_, transfer, trials_[t], references_[t], options));
     const auto mean = [&](ErrorPart ErrorParts::*part) {
         std::vector<ErrorPart> of_trials;
         for (const ErrorParts& p : parts) of_trials.push_back(p.*part);

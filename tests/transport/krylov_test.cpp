@@ -152,6 +152,33 @@ TEST(SolveSecondKind, GoesOnWhereAChannelIsDarkOrDone) {
     EXPECT_LT((channel_of(result.solution, 2, 3) - exact).norm(), 2e-3 * exact.norm());
 }
 
+// A colour whose light dies after few bounces, as between red walls among blue ones, while the others need many.
+TEST(SolveSecondKind, KeepsAChannelThatIsDoneBeforeTheOthers) {
+    constexpr int size = 300;
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+        Rng rng(seed, 1);
+        Eigen::MatrixXd dying = Eigen::MatrixXd::Zero(size, size); // onto a few, which return nothing, or next to nothing
+        for (int i = 0; i < 4; ++i)
+            for (int j = 4; j < size; ++j) {
+                dying(i, j) = rng.uniform() * 0.9 / size;
+                dying(j, i) = seed % 2 == 0 ? 0.0 : 1e-7 * rng.uniform();
+            }
+        const std::vector<Eigen::MatrixXd> matrix{dying, random_contraction(size, 0.9, 40 + seed, true),
+                                                  random_contraction(size, 0.7, 70 + seed, false)};
+        const std::vector<float> b = random_light(3 * size, 100 + seed);
+        for (const double tolerance : {2e-2, 2e-3, 1e-4}) {
+            const KrylovResult result = solve_second_kind(multiplication(matrix), b, 3, tolerance);
+            EXPECT_LE(result.residual, tolerance);
+            EXPECT_GT(result.products, 4);
+            for (int c = 0; c < 3; ++c) {
+                const Eigen::VectorXd rhs = channel_of(b, c, 3), solution = channel_of(result.solution, c, 3);
+                EXPECT_LE((rhs - solution + matrix[c] * solution).norm(), (tolerance + 1e-5) * (matrix[c] * rhs).norm())
+                    << "channel " << c << ", seed " << seed;
+            }
+        }
+    }
+}
+
 TEST(SolveSecondKind, LeavesLightThatNeverBouncesAlone) {
     const Apply nothing = [](const std::vector<float>& f) { return std::vector<float>(f.size()); };
     const std::vector<float> b = random_light(30, 7);

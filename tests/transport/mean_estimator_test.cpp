@@ -39,6 +39,26 @@ TEST(MeanEstimator, MeansAndErrorsAreThoseOfTheDistribution) {
     EXPECT_EQ(e.rays, 64u * 4096u);
 }
 
+TEST(MeanEstimator, LooksLongerForWhatIsRareAndEndsWhereThereIsNothing) {
+    for (std::uint64_t seed = 0; seed < 8; ++seed) {
+        constexpr double share = 1e-3; // of samples that find anything: of the first 192, hardly ever one
+        const Sampler rare = [](Index, std::uint64_t stream, Index first, Index count, std::span<Eigen::Array3d> sums) {
+            for (Index k = first; k < first + count; ++k)
+                if (Rng(stream, static_cast<std::uint64_t>(k)).uniform() < share) sums[0] += 1.0;
+            return std::uint64_t{0};
+        };
+        const MeanEstimate e = estimate_means(1, 1, rare, {.target_error = 0.05, .seed = seed});
+        EXPECT_NEAR(e.mean(0, 0), share, 5.0 * 0.05 * share);
+        EXPECT_GT(e.relative_error[0], 0.0);
+        EXPECT_LE(e.relative_error[0], 0.05);
+    }
+    const Sampler nothing = [](Index, std::uint64_t, Index, Index, std::span<Eigen::Array3d>) { return std::uint64_t{0}; };
+    const MeanEstimate dark = estimate_means(3, 2, nothing, {.target_error = 0.05});
+    EXPECT_TRUE((dark.mean == 0.0f).all());
+    EXPECT_GE(dark.samples, 1u << 20);
+    EXPECT_LE(dark.samples, 1u << 23);
+}
+
 TEST(MeanEstimator, ReachesATargetAndGivesNoisyItemsMoreSamples) {
     std::vector<std::atomic<Index>> taken(64);
     const Sampler counting = [&](Index item, std::uint64_t seed, Index first, Index count,
