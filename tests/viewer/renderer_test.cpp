@@ -255,10 +255,11 @@ TEST_P(OnContext, TexturesLargerThanOpenGlTakesAreShownSmaller) {
             for (int c = 0; c < 3; ++c) halves.push_back(c == (2 * x < width ? 0 : 1) ? 200 : 0);
     write_png_bytes(folder.path("halves.png"), width, 2, halves);
     folder.write("room.mtl", "newmtl floor\nmap_Kd halves.png\nnewmtl plain\nKd 0.6 0.6 0.6\n");
-    const TransferScene& scene = opened(folder.write("room.obj",
+    const std::string room = folder.write("room.obj",
         "mtllib room.mtl\nv 0 0 0\nv 4 0 0\nv 4 0 4\nv 0 0 4\nv 0 3 0\nv 4 3 0\nv 4 3 4\nv 0 3 4\n"
         "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl floor\nf 1/1 4/4 3/3 2/2\n"
-        "usemtl plain\nf 1 2 6 5\nf 5 6 7 8\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"));
+        "usemtl plain\nf 1 2 6 5\nf 5 6 7 8\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+    const TransferScene& scene = opened(room);
     Renderer renderer(context->gl(), scene, IndirectMethod::gather);
     const Camera down{.position = {2.0f, 2.9f, 2.0f}, .target = {2.0f, 0.0f, 2.0f}, .up = {0.0f, 0.0f, 1.0f},
                       .vertical_fov = 50.0f, .width = 60, .height = 60};
